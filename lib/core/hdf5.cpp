@@ -1,0 +1,311 @@
+#include "core/hdf5.h"
+
+#include <hdf5.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cstring>
+
+#include "core/error.h"
+#include "core/output_file.h"
+
+namespace coral {
+namespace {
+
+/// An HDF5 identifier closed by the function that fits it.
+class Id {
+public:
+    Id(hid_t id, herr_t (*close)(hid_t)) : id_(id), close_(close) {}
+    ~Id() { if (id_ >= 0) close_(id_); }
+    Id(const Id&) = delete;
+    Id& operator=(const Id&) = delete;
+    operator hid_t() const { return id_; }
+    bool valid() const { return id_ >= 0; }
+
+private:
+    hid_t id_;
+    herr_t (*close_)(hid_t);
+};
+
+Id string_type(std::size_t length)
+{
+    const hid_t type = H5Tcopy(H5T_C_S1);
+    H5Tset_size(type, std::max<std::size_t>(length, 1));
+    H5Tset_cset(type, H5T_CSET_UTF8);
+    H5Tset_strpad(type, H5T_STR_NULLPAD);
+    return {type, H5Tclose};
+}
+
+/// Large arrays go in chunks of about 64k elements along the first axis.
+Id creation_list(const std::vector<std::size_t>& dims)
+{
+    const hid_t list = H5Pcreate(H5P_DATASET_CREATE);
+    H5Pset_obj_track_times(list, 0);
+    std::size_t count = 1;
+    for (std::size_t d : dims) count *= d;
+    if (count > 4096) {
+        std::vector<hsize_t> chunk(dims.begin(), dims.end());
+        std::size_t row = count / dims[0];
+        chunk[0] = std::clamp<hsize_t>(65536 / std::max<std::size_t>(row, 1), 1, dims[0]);
+        H5Pset_chunk(list, static_cast<int>(chunk.size()), chunk.data());
+        H5Pset_shuffle(list);
+        H5Pset_deflate(list, 4);
+    }
+    return {list, H5Pclose};
+}
+
+bool numeric(const std::string& text)
+{
+    return !text.empty() && std::ranges::all_of(text, [](unsigned char c) { return std::isdigit(c); });
+}
+
+herr_t collect_name(hid_t, const char* name, const H5L_info_t*, void* names)
+{
+    static_cast<std::vector<std::string>*>(names)->emplace_back(name);
+    return 0;
+}
+
+}  // namespace
+
+struct H5File::Impl {
+    std::filesystem::path path;
+    std::unique_ptr<OutputFile> output;  ///< set while a new file is being written
+    hid_t file = -1;
+
+    ~Impl() { close(); }
+    void close()
+    {
+        if (file >= 0) H5Fclose(file);
+        file = -1;
+    }
+    [[noreturn]] void fail(const std::string& object, const std::string& what) const
+    {
+        throw Error(path.string() + ":" + object, what, output ? "check the space left on the disk" : "is it the right file? make it again with the tool that wrote it");
+    }
+    bool exists(const std::string& object) const
+    {
+        if (object == "/" || object.empty()) return true;
+        for (std::size_t i = 1; i <= object.size(); ++i) {
+            if (i != object.size() && object[i] != '/') continue;
+            if (H5Lexists(file, object.substr(0, i).c_str(), H5P_DEFAULT) <= 0) return false;
+        }
+        return true;
+    }
+    Id open_dataset(const std::string& object) const
+    {
+        if (!exists(object)) fail(object, "is missing");
+        const hid_t id = H5Dopen2(file, object.c_str(), H5P_DEFAULT);
+        if (id < 0) fail(object, "is not a dataset");
+        return {id, H5Dclose};
+    }
+    std::vector<std::size_t> dims(hid_t dataset) const
+    {
+        const Id space(H5Dget_space(dataset), H5Sclose);
+        std::vector<hsize_t> sizes(static_cast<std::size_t>(std::max(0, H5Sget_simple_extent_ndims(space))));
+        H5Sget_simple_extent_dims(space, sizes.data(), nullptr);
+        return {sizes.begin(), sizes.end()};
+    }
+    void write(const std::string& object, const void* data, std::size_t count, hid_t type, const std::vector<std::size_t>& shape)
+    {
+        std::size_t expected = 1;
+        for (std::size_t d : shape) expected *= d;
+        if (expected != count) fail(object, "dimensions do not fit the data");
+        const std::vector<hsize_t> sizes(shape.begin(), shape.end());
+        const Id space(H5Screate_simple(static_cast<int>(sizes.size()), sizes.data(), nullptr), H5Sclose);
+        const Id links(H5Pcreate(H5P_LINK_CREATE), H5Pclose);
+        H5Pset_create_intermediate_group(links, 1);
+        const Id list = creation_list(shape);
+        const Id dataset(H5Dcreate2(file, object.c_str(), type, space, links, list, H5P_DEFAULT), H5Dclose);
+        if (!dataset.valid() || (count > 0 && H5Dwrite(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, data) < 0)) fail(object, "could not be written");
+    }
+    template <class T>
+    std::vector<T> read(const std::string& object, hid_t type) const
+    {
+        const Id dataset = open_dataset(object);
+        std::size_t count = 1;
+        for (std::size_t d : dims(dataset)) count *= d;
+        const Id stored(H5Dget_type(dataset), H5Tclose);
+        const H5T_class_t kind = H5Tget_class(stored);
+        if (kind != H5T_INTEGER && kind != H5T_FLOAT) fail(object, "holds no numbers");
+        std::vector<T> values(count);
+        if (count > 0 && H5Dread(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()) < 0) fail(object, "is damaged");
+        return values;
+    }
+    void set_attribute(const std::string& object, const std::string& name, hid_t type, hid_t space, const void* data)
+    {
+        const Id owner(H5Oopen(file, object.c_str(), H5P_DEFAULT), H5Oclose);
+        if (!owner.valid()) fail(object, "is missing");
+        if (H5Aexists(owner, name.c_str()) > 0) H5Adelete(owner, name.c_str());
+        const Id attribute(H5Acreate2(owner, name.c_str(), type, space, H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
+        if (!attribute.valid() || H5Awrite(attribute, type, data) < 0) fail(object, "attribute " + name + " could not be written");
+    }
+    Id open_attribute(const std::string& object, const std::string& name) const
+    {
+        if (!exists(object)) fail(object, "is missing");
+        const hid_t id = H5Aopen_by_name(file, object.c_str(), name.c_str(), H5P_DEFAULT, H5P_DEFAULT);
+        if (id < 0) fail(object, "attribute " + name + " is missing");
+        return {id, H5Aclose};
+    }
+};
+
+H5File::H5File(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+H5File::H5File(H5File&&) noexcept = default;
+H5File& H5File::operator=(H5File&&) noexcept = default;
+H5File::~H5File() = default;
+
+H5File H5File::create(const std::filesystem::path& file)
+{
+    H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
+    auto impl = std::make_unique<Impl>();
+    impl->path = file;
+    impl->output = std::make_unique<OutputFile>(file);
+    const Id access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
+    H5Pset_libver_bounds(access, H5F_LIBVER_V18, H5F_LIBVER_V110);
+    const Id creation(H5Pcreate(H5P_FILE_CREATE), H5Pclose);
+    H5Pset_obj_track_times(creation, 0);
+    impl->file = H5Fcreate(impl->output->temporary().c_str(), H5F_ACC_TRUNC, creation, access);
+    if (impl->file < 0) throw Error(file.string(), "cannot be written");
+    return H5File(std::move(impl));
+}
+
+H5File H5File::open(const std::filesystem::path& file)
+{
+    H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
+    if (!std::filesystem::is_regular_file(file)) throw Error(file.string(), "no such file");
+    auto impl = std::make_unique<Impl>();
+    impl->path = file;
+    const Id access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
+    impl->file = H5Fopen(file.c_str(), H5F_ACC_RDONLY, access);
+    if (impl->file < 0) throw Error(file.string(), "is not an HDF5 file, or is damaged");
+    return H5File(std::move(impl));
+}
+
+void H5File::commit()
+{
+    if (H5Fflush(impl_->file, H5F_SCOPE_GLOBAL) < 0) impl_->fail("/", "could not be written");
+    impl_->close();
+    impl_->output->commit();
+}
+
+const std::filesystem::path& H5File::path() const { return impl_->path; }
+
+bool H5File::exists(const std::string& path) const { return impl_->exists(path); }
+
+std::vector<std::string> H5File::members(const std::string& group) const
+{
+    std::vector<std::string> names;
+    if (!impl_->exists(group)) return names;
+    const Id id(H5Gopen2(impl_->file, group.c_str(), H5P_DEFAULT), H5Gclose);
+    if (!id.valid()) return names;
+    H5Literate(id, H5_INDEX_NAME, H5_ITER_INC, nullptr, collect_name, &names);
+    if (std::ranges::all_of(names, numeric)) std::ranges::sort(names, {}, [](const std::string& n) { return std::stoull(n); });
+    return names;
+}
+
+void H5File::make_group(const std::string& path)
+{
+    if (impl_->exists(path)) return;
+    const Id links(H5Pcreate(H5P_LINK_CREATE), H5Pclose);
+    H5Pset_create_intermediate_group(links, 1);
+    const Id group(H5Gcreate2(impl_->file, path.c_str(), links, H5P_DEFAULT, H5P_DEFAULT), H5Gclose);
+    if (!group.valid()) impl_->fail(path, "could not be written");
+}
+
+void H5File::write(const std::string& path, std::span<const double> data, std::vector<std::size_t> dims) { impl_->write(path, data.data(), data.size(), H5T_NATIVE_DOUBLE, dims); }
+void H5File::write(const std::string& path, std::span<const float> data, std::vector<std::size_t> dims) { impl_->write(path, data.data(), data.size(), H5T_NATIVE_FLOAT, dims); }
+void H5File::write(const std::string& path, std::span<const std::int64_t> data, std::vector<std::size_t> dims) { impl_->write(path, data.data(), data.size(), H5T_NATIVE_INT64, dims); }
+void H5File::write(const std::string& path, std::span<const std::int32_t> data, std::vector<std::size_t> dims) { impl_->write(path, data.data(), data.size(), H5T_NATIVE_INT32, dims); }
+void H5File::write(const std::string& path, std::span<const std::uint8_t> data, std::vector<std::size_t> dims) { impl_->write(path, data.data(), data.size(), H5T_NATIVE_UINT8, dims); }
+
+void H5File::write(const std::string& path, std::span<const std::string> data)
+{
+    std::size_t length = 1;
+    for (const std::string& text : data) length = std::max(length, text.size());
+    std::vector<char> packed(length * data.size(), '\0');
+    for (std::size_t i = 0; i < data.size(); ++i) std::memcpy(packed.data() + i * length, data[i].data(), data[i].size());
+    const Id type = string_type(length);
+    impl_->write(path, packed.data(), data.size(), type, {data.size()});
+}
+
+std::vector<std::size_t> H5File::dims(const std::string& path) const { return impl_->dims(impl_->open_dataset(path)); }
+std::vector<double> H5File::read_doubles(const std::string& path) const { return impl_->read<double>(path, H5T_NATIVE_DOUBLE); }
+std::vector<float> H5File::read_floats(const std::string& path) const { return impl_->read<float>(path, H5T_NATIVE_FLOAT); }
+std::vector<std::int64_t> H5File::read_integers(const std::string& path) const { return impl_->read<std::int64_t>(path, H5T_NATIVE_INT64); }
+std::vector<std::uint8_t> H5File::read_bytes(const std::string& path) const { return impl_->read<std::uint8_t>(path, H5T_NATIVE_UINT8); }
+
+std::vector<std::string> H5File::read_strings(const std::string& path) const
+{
+    const Id dataset = impl_->open_dataset(path);
+    const Id type(H5Dget_type(dataset), H5Tclose);
+    if (H5Tget_class(type) != H5T_STRING || H5Tis_variable_str(type) > 0) impl_->fail(path, "holds no fixed-length strings");
+    const std::size_t length = H5Tget_size(type);
+    std::size_t count = 1;
+    for (std::size_t d : impl_->dims(dataset)) count *= d;
+    std::vector<char> packed(length * count);
+    if (count > 0 && H5Dread(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, packed.data()) < 0) impl_->fail(path, "is damaged");
+    std::vector<std::string> texts;
+    for (std::size_t i = 0; i < count; ++i) {
+        const char* begin = packed.data() + i * length;
+        texts.emplace_back(begin, std::find(begin, begin + length, '\0'));
+    }
+    return texts;
+}
+
+void H5File::set_attribute(const std::string& path, const std::string& name, const std::string& value)
+{
+    const Id type = string_type(value.size());
+    const Id space(H5Screate(H5S_SCALAR), H5Sclose);
+    // A long text (a history) does not fit the 64 kB of compact attribute storage in the oldest format; V18 bounds lift that.
+    impl_->set_attribute(path, name, type, space, value.empty() ? "" : value.data());
+}
+void H5File::set_attribute(const std::string& path, const std::string& name, const char* value) { set_attribute(path, name, std::string(value)); }
+void H5File::set_attribute(const std::string& path, const std::string& name, double value)
+{
+    const Id space(H5Screate(H5S_SCALAR), H5Sclose);
+    impl_->set_attribute(path, name, H5T_NATIVE_DOUBLE, space, &value);
+}
+void H5File::set_attribute(const std::string& path, const std::string& name, std::int64_t value)
+{
+    const Id space(H5Screate(H5S_SCALAR), H5Sclose);
+    impl_->set_attribute(path, name, H5T_NATIVE_INT64, space, &value);
+}
+void H5File::set_attribute(const std::string& path, const std::string& name, std::span<const double> values)
+{
+    const hsize_t size = values.size();
+    const Id space(H5Screate_simple(1, &size, nullptr), H5Sclose);
+    impl_->set_attribute(path, name, H5T_NATIVE_DOUBLE, space, values.data());
+}
+
+bool H5File::has_attribute(const std::string& path, const std::string& name) const
+{
+    return impl_->exists(path) && H5Aexists_by_name(impl_->file, path.c_str(), name.c_str(), H5P_DEFAULT) > 0;
+}
+
+std::string H5File::string_attribute(const std::string& path, const std::string& name) const
+{
+    const Id attribute = impl_->open_attribute(path, name);
+    const Id type(H5Aget_type(attribute), H5Tclose);
+    if (H5Tget_class(type) != H5T_STRING || H5Tis_variable_str(type) > 0) impl_->fail(path, "attribute " + name + " is no text");
+    std::string value(H5Tget_size(type), '\0');
+    if (H5Aread(attribute, type, value.data()) < 0) impl_->fail(path, "attribute " + name + " is damaged");
+    value.resize(std::min(value.find('\0'), value.size()));
+    return value;
+}
+
+double H5File::number_attribute(const std::string& path, const std::string& name) const
+{
+    const auto values = numbers_attribute(path, name);
+    if (values.size() != 1) impl_->fail(path, "attribute " + name + " is not one number");
+    return values[0];
+}
+
+std::vector<double> H5File::numbers_attribute(const std::string& path, const std::string& name) const
+{
+    const Id attribute = impl_->open_attribute(path, name);
+    const Id space(H5Aget_space(attribute), H5Sclose);
+    std::vector<double> values(static_cast<std::size_t>(H5Sget_simple_extent_npoints(space)));
+    if (H5Aread(attribute, H5T_NATIVE_DOUBLE, values.data()) < 0) impl_->fail(path, "attribute " + name + " holds no numbers");
+    return values;
+}
+
+}  // namespace coral

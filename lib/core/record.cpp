@@ -1,0 +1,29 @@
+#include "core/record.h"
+
+#include <nlohmann/json.hpp>
+
+#include "core/error.h"
+
+namespace coral {
+
+std::string to_json(const History& history)
+{
+    auto array = nlohmann::json::array();
+    for (const RecordEntry& entry : history) {
+        array.push_back({{"tool", entry.tool}, {"version", entry.version}, {"options", entry.options}, {"inputs", entry.inputs}});
+    }
+    return array.dump();
+}
+
+History history_from_json(const std::string& text, const std::string& where)
+try {
+    History history;
+    for (const auto& item : nlohmann::json::parse(text)) {
+        history.push_back({item.at("tool"), item.at("version"), item.at("options"), item.at("inputs")});
+    }
+    return history;
+} catch (const nlohmann::json::exception&) {
+    throw Error(where, "the history of the file is damaged", "make the file again with the tool that wrote it");
+}
+
+}  // namespace coral
