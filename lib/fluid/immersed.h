@@ -1,0 +1,113 @@
+#pragma once
+/// \file fluid/immersed.h
+/// Resolved grains and obstacles in the flow: solid fraction of faces from a signed distance, implicit Brinkman forcing,
+/// hydrodynamic force and torque as the discrete reaction. Distances are negative in solid.
+#include <Eigen/Geometry>
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "fluid/flow.h"
+
+namespace coral::fluid {
+
+/// Signed distance [m] of each point [m], in the frame of the body; distances.size() == points.size(). Called from several threads.
+using DistanceFunction = std::function<void(std::span<const Eigen::Vector3d> points, std::span<double> distances)>;
+
+/// Shape of a body in its own frame. The box holds the solid; outside it nothing is sampled.
+struct BodyShape {
+    DistanceFunction distance;
+    Eigen::Vector3d box_min = Eigen::Vector3d::Zero();  ///< [m]
+    Eigen::Vector3d box_max = Eigen::Vector3d::Zero();  ///< [m]
+};
+
+/// Sphere about the origin of its frame.
+BodyShape sphere_shape(double diameter);
+/// Plate lying in the x-y plane of its frame, |z| <= thickness/2, |x|, |y| <= half_size, with square holes of edge `hole` in a
+/// square lattice of spacing `pitch`; a hole is centred on the frame's origin unless `holes_off_centre`, then the origin lies amid four holes.
+/// \throws UsageError  hole not smaller than pitch
+BodyShape plate_shape(double thickness, double hole, double pitch, const Eigen::Vector2d& half_size, bool holes_off_centre = false);
+
+/// Pose and velocity of a rigid body; position is the centre of mass = origin of the shape's frame. [m], [m/s], [rad/s] world frame
+struct RigidMotion {
+    Eigen::Vector3d position = Eigen::Vector3d::Zero();
+    Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();
+    Eigen::Vector3d velocity = Eigen::Vector3d::Zero();
+    Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();
+};
+
+/// What the fluid does to a body over one step, hydrostatic buoyancy left out.
+/// The caller advances U by   (m_p + M_w - m_f) dU = dt (force + contacts + (m_p - m_f) g)   [fluid-notes, eq. 11]
+/// and omega with I_p + I_w - I_f alike (plus virtual mass when the grain is lighter than 0.8 of the fluid).
+struct FluidAction {
+    Eigen::Vector3d force = Eigen::Vector3d::Zero();          ///< [N]
+    Eigen::Vector3d torque = Eigen::Vector3d::Zero();         ///< about the centre of mass [N m]
+    Eigen::Vector3d forced_mass = Eigen::Vector3d::Zero();    ///< M_w = rho sum w V, per velocity component [kg]
+    Eigen::Matrix3d forced_inertia = Eigen::Matrix3d::Zero();  ///< I_w, about the centre of mass [kg m2]
+};
+
+struct ForcingOptions {
+    double viscous_rate = 20.0;    ///< C1 of eq. 8
+    double inertial_rate = 0.5;    ///< C2 of eq. 8
+    bool plain_blend = false;      ///< the paper's u = (1-phi) u + phi u_s: its drag depends on the time step; for comparison only
+    double reshape_distance = 0.0; ///< a body keeps its faces until a point of it has moved this many cells; 0.05 saves time
+};
+
+class ImmersedBodies {
+public:
+    explicit ImmersedBodies(const GridSpec& grid, const ForcingOptions& options = {});
+    ImmersedBodies(ImmersedBodies&&) noexcept;
+    ImmersedBodies& operator=(ImmersedBodies&&) noexcept;
+    ~ImmersedBodies();
+
+    /// Adds a body; its index is returned. Faces are found at the next place().
+    std::size_t add(BodyShape shape, const RigidMotion& motion);
+    std::size_t size() const { return bodies_.size(); }
+
+    /// Finds the faces of bodies that moved by more than reshape_distance since their faces were last found.
+    /// \param motions  one per body, in the order of add(). Bodies wrap across periodic sides.
+    void place(std::span<const RigidMotion> motions);
+
+    /// Force and torque from the provisional velocity, with the motions at the start of the step  [fluid-notes, eq. 10, 12]:
+    ///     F = (rho/dt) sum_faces w eps (u* - u_s) h3
+    /// Weights w [eq. 8] are kept for apply(). \returns one action per body, valid until the next call
+    std::span<const FluidAction> measure(Flow& flow, double dt, std::span<const RigidMotion> motions);
+
+    /// u* <- u* + w (u_s - u*) with the motions at the end of the contact steps [eq. 7]; books the impulse in the flow's tally.
+    void apply(Flow& flow, std::span<const RigidMotion> motions);
+
+    /// Solid fraction of cells (mean of their six faces), padded like a field of the flow, ghosts 0.
+    const Field& cell_solid_fraction() const { return cell_solid_; }
+    /// Solid fraction of faces of a component, overlaps clipped at 1.
+    const Field& face_solid_fraction(int axis) const { return face_solid_[axis]; }
+    /// Volume of a body as the faces see it (mean over the components) [m3].
+    double face_volume(std::size_t body) const;
+    /// Counts place() calls that changed anything.
+    std::uint64_t version() const { return version_; }
+
+    /// Poses at which the faces of each body were last found: to be stored in a checkpoint, and given to restore().
+    std::vector<RigidMotion> placed_motions() const;
+    /// Finds all faces anew at exactly these poses, so that a resumed run continues bit for bit.
+    void restore(std::span<const RigidMotion> placed_motions);
+
+private:
+    struct Run;       // faces in a row with solid fraction 1
+    struct CutFace;   // one face with a fraction
+    struct Body;      // faces of one body
+    struct Shared;    // a face on which several bodies meet
+
+    void rasterise(Body& body) const;
+    void merge();
+
+    GridSpec grid_;
+    Layout layout_;
+    ForcingOptions options_;
+    std::vector<std::unique_ptr<Body>> bodies_;
+    std::vector<Shared> shared_;
+    std::vector<FluidAction> actions_;
+    std::array<Field, 3> face_solid_;
+    Field cell_solid_;
+    std::uint64_t version_ = 0;
+};
+
+}  // namespace coral::fluid

@@ -1,0 +1,99 @@
+#pragma once
+/// \file fluid/porous.h
+/// Fines in the flow: kernel averages both ways. Each particle spreads its volume and its reaction over cells around it, and feels
+/// averages of the flow, all with the weights  w_ic = k(2 dist/R) (1 - phi_c) / sum  of Peskin's four-point kernel
+/// [Huang et al., eq. 15, with 4 r^2 for the printed 4 r^4], R the support radius. Cells beyond a wall are folded back by
+/// reflection, cells in resolved grains (phi_c) take no part, and the weights of each particle sum to 1.
+#include <span>
+#include <vector>
+
+#include "fluid/flow.h"
+
+namespace coral::fluid {
+
+/// Peskin's four-point kernel along the radius, r >= 0; 0 from r = 2 on.
+double peskin_kernel(double r);
+
+struct KernelOptions {
+    double volume_support = 2.0;  ///< diameter of the support over the particle diameter, for void fraction and pressure force
+    double felt_support = 4.0;    ///< the same for what a particle feels and for its drag reaction
+    double smallest_support = 3.0;  ///< lower limit of the volume support [cells]; the felt one keeps its ratio to it
+    double smallest_void_fraction = 0.15;
+    int coupling_cells = 0;  ///< felt averages work on blocks of this many cells along an edge; 0 chooses (1 when d < 3 cells)
+};
+
+/// What one particle feels.
+struct FeltFlow {
+    double void_fraction = 1.0;                                     ///< wide kernel
+    Eigen::Vector3d velocity = Eigen::Vector3d::Zero();             ///< interstitial, wide kernel [m/s]
+    Eigen::Vector3d pressure_gradient = Eigen::Vector3d::Zero();    ///< of the kinematic pressure, volume kernel [m/s2]
+};
+
+/// Kernel weights of a set of fines for one step. Call, each flow step:
+///     place(positions, diameters, cell_solid); deposit_volume(flow, volumes, velocities); feel(flow, felt);
+///     ... drag from fluid/drag.h: b_i and F_i with F_i' = dF_i/du = b_i ...
+///     deposit_drag(flow, b, F); flow.predict(dt); drag_lag(flow, lag) -> F_i + lag_i is the drag the particle really gets.
+/// Then fluid + particles exchange momentum to round-off.
+class FineCoupling {
+public:
+    explicit FineCoupling(const GridSpec& grid, const KernelOptions& options = {});
+
+    /// Finds the weights. A particle outside the domain is treated as if on its border.
+    /// \param positions [m], \param diameters [m] \param cell_solid  ImmersedBodies::cell_solid_fraction(), or nullptr without grains
+    void place(std::span<const Eigen::Vector3d> positions, std::span<const double> diameters, const Field* cell_solid);
+
+    /// eps_c = 1 - sum_i w_ic V_i / h3 and the solid flux J_s = sum_i w V_i v_i / h3 on faces, given to the flow.
+    void deposit_volume(Flow& flow, std::span<const double> volumes, std::span<const Eigen::Vector3d> velocities);
+
+    /// What each particle feels of the last whole step. felt.size() == particles. The pressure force on particle i is
+    /// -rho V_i pressure_gradient (as clipped: it closes with the fluid's -eps grad p to round-off).
+    void feel(const Flow& flow, std::span<FeltFlow> felt) const;
+
+    /// Spreads the drag: coefficients b_i = dF_i/du [kg/s] and explicit forces F_i on the particles [N].
+    void deposit_drag(Flow& flow, std::span<const double> coefficients, std::span<const Eigen::Vector3d> forces);
+
+    /// After predict(): force b_i (u* - u^n) felt by particle i beyond F_i [N], which the fluid has already paid.
+    void drag_lag(const Flow& flow, std::span<const double> coefficients, std::span<Eigen::Vector3d> lag) const;
+
+    std::size_t size() const { return count_; }
+    /// Void fraction as last deposited, padded like a field.
+    const Field& void_fraction() const { return void_fraction_; }
+    /// Blocks of cells used for the felt averages, and stored weights (for the performance report).
+    int coupling_cells() const { return block_; }
+    std::size_t stored_weights() const { return volume_.weights.size() + felt_.weights.size(); }
+
+private:
+    /// A run of cells along x, of one particle.
+    struct Row {
+        std::int32_t start = 0;   // linear cell index
+        std::int32_t length = 0;
+        std::int32_t plane = 0;   // k of the run
+    };
+    /// Weights of all particles on one (cell or block) grid, particle after particle.
+    struct Weights {
+        std::vector<Row> rows;
+        std::vector<std::size_t> first_row, first_weight;  // per particle, one past the end last
+        std::vector<double> weights;
+    };
+
+    void find_weights(Weights& target, const Eigen::Vector3i& cells, double cell, double support_factor,
+                      std::span<const Eigen::Vector3d> positions, std::span<const double> diameters,
+                      const std::vector<double>& open) const;
+    template <int width, class Value>
+    void scatter(const Weights& source, const Eigen::Vector3i& cells, std::vector<double>& target, const Value& value) const;
+    template <int width>
+    void gather(const Weights& source, std::size_t particle, const std::vector<double>& field, double* sum) const;
+    void to_blocks(const std::vector<double>& cell_values, int width, std::vector<double>& block_values) const;
+
+    GridSpec grid_;
+    Layout layout_;
+    KernelOptions options_;
+    int block_ = 1;
+    std::size_t count_ = 0;
+    Weights volume_, felt_;
+    std::vector<double> open_cells_, open_blocks_;  // 1 - phi per cell; its sum per block
+    std::vector<double> volumes_, clip_;            // V_i; (1 - eps)/(raw solid fraction) per cell
+    Field void_fraction_;
+};
+
+}  // namespace coral::fluid
