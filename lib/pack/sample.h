@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "core/record.h"
+#include "dem/body.h"
 #include "sdf/distance_grid.h"
 
 namespace coral::pack {
@@ -35,21 +36,19 @@ struct ShapeTemplate {
     Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();  ///< about the centre of mass, at density 1 kg/m3 [m5]
     /// Distance on a dense lattice, exact in the whole range that contact queries [m]; null for spheres.
     std::shared_ptr<const sdf::DistanceGrid> grid;
+    /// The same with voids filled, clamped to a narrow band: tells void from outside. Null for spheres and sh (no voids).
+    std::shared_ptr<const sdf::DistanceGrid> apparent_grid;
     std::vector<Eigen::Vector3d> nodes;  ///< surface nodes, shape frame [m]; empty for spheres
     std::vector<double> node_areas;      ///< their tributary areas; they sum to the surface [m2]
     int degree = 0;                      ///< of the spherical harmonics; 0 for other kinds
     std::vector<double> coefficients;    ///< (degree + 1)^2 real orthonormal coefficients of the radius [m], index l(l+1)+m
 };
 
-/// Contact law of one material; keys as in case.toml.
-struct Material {
-    std::string name = "default";
-    double density = 2780;              ///< [kg/m3]
-    double normal_stiffness = 2e5;      ///< [N/m]
-    double tangential_stiffness = 1e5;  ///< [N/m]
-    double friction = 0.7;              ///< [-]
-    double damping = 0.3;               ///< ratio to critical [-]
-};
+/// The contact law, touching pairs and friction springs are those of the discrete element world.
+/// Contact::second and ContactSpring::second: >= 0 a particle, -1 - w wall w of Sample::walls.
+using Material = dem::Material;
+using Contact = dem::Contact;
+using ContactSpring = dem::ContactSpring;
 
 struct Particle {
     Eigen::Vector3d position = Eigen::Vector3d::Zero();            ///< of the centre of mass [m]
@@ -67,24 +66,8 @@ struct Wall {
     std::string name;  ///< "x-", "x+", "y-", "y+", "z-", "z+"
     Eigen::Vector3d point = Eigen::Vector3d::Zero();    ///< [m]
     Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  ///< [-]
+    double friction = 0;  ///< of the wall during the packing [-]
     double pressure = 0;  ///< mean normal pressure of the bodies on the wall at the end of the packing [Pa]
-};
-
-/// One touching pair at the end of the packing. `second` >= 0 is a particle; -1 - w is wall w.
-struct Contact {
-    std::int32_t first = 0, second = 0;
-    double overlap = 0;                                 ///< greatest depth [m]
-    Eigen::Vector3d point = Eigen::Vector3d::Zero();    ///< force-weighted centre [m]
-    Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  ///< unit, from second towards first
-    Eigen::Vector3d force = Eigen::Vector3d::Zero();    ///< on first [N]
-};
-
-/// One friction spring of a touching pair: what the contact law remembers between steps.
-struct ContactSpring {
-    std::int32_t first = 0, second = 0;  ///< as in Contact
-    std::int32_t node = -1;              ///< node of the slave surface, or slot of a sphere contact
-    Eigen::Vector3d spring = Eigen::Vector3d::Zero();  ///< elongation, world frame [m]
-    Eigen::Vector3d normal = Eigen::Vector3d::Zero();  ///< contact normal it was last turned to; zero when unused
 };
 
 /// Point of a gradation curve.

@@ -35,42 +35,45 @@ struct Population {
     double grid_spacing = 0;           ///< of tabulated sh shapes [m]; 0: equivalent diameter / 60
 };
 
+/// Grains are poured in alternating layers of coarse and fine; each layer settles before the next comes.
+/// Softer contacts allow a longer step where gravity sets the pace; the final relaxation always has the true parameters.
 struct Dropping {
-    int layers = 0;                 ///< pairs of a coarse and a fine layer; 0: from the box and the grains
-    double drop_height = 0;         ///< gap between the settled surface and the lowest new grain [m]; 0: half the largest fine
-    double friction = 0.1;          ///< sliding friction while grains settle [-]
-    double damping = 0.5;           ///< contact damping ratio while grains settle [-]
-    double stiffness_factor = 0.05; ///< softening of contacts while grains settle; the step grows by 1/sqrt of it
-    double drag = 20;               ///< viscous damping rate of velocities while grains settle [1/s]
-    double unbalanced_ratio = 0.05; ///< a layer has settled below this
-    double kinetic_ratio = 0.1;     ///< and below this mean speed over sqrt(g d)
-    double time_limit = 0.2;        ///< longest settling of one layer, then the next is dropped [s]
+    int layers = 0;                  ///< pairs of a coarse and a fine layer; 0: as many as the coarse grains need
+    double drop_height = 0;          ///< gap between the highest settled grain and a new one [m]
+    double friction = 0.1;           ///< sliding friction while grains settle [-]
+    double damping = 0.5;            ///< contact damping ratio while grains settle [-]
+    double stiffness_factor = 0.05;  ///< softens contacts while grains settle; the step grows by 1/sqrt of it [-]
+    double drag = 10;                ///< rate at which velocities decay while grains settle [1/s]
+    double unbalanced_ratio = 0.1;   ///< a layer has settled when the unbalanced ratio is below this ...
+    double speed_ratio = 0.05;       ///< ... and the mean speed below this times sqrt(g d), d of the smallest grain
+    double time_limit = 0.15;        ///< longest settling of one layer [s]
 };
 
 enum class CompressionTarget { none, pressure, void_ratio };
 
+/// Walls move at true stiffness and density, then stand still for the final relaxation.
 struct Compression {
     CompressionTarget target = CompressionTarget::none;
     double pressure = 0;             ///< [Pa]
     double void_ratio = 0;           ///< interparticle [-]
+    bool lateral = true;             ///< all six walls move; false: only the top, the base keeps its size
     double friction = -1;            ///< while walls move [-]; negative: the material's
-    double stiffness_factor = 0.05;  ///< while walls move far from the target
-    double max_velocity = 0.1;       ///< of a wall [m/s]
-    double tolerance = 0.02;         ///< of the pressure on each wall, relative
-    double unbalanced_ratio = 1e-2;  ///< final relaxation ends below this
-    double kinetic_ratio = 1e-4;     ///< and below this kinetic / elastic energy
-    double time_limit = 0.5;         ///< of the compression, simulated [s]
-    double gravity_factor = 0;       ///< share of gravity acting during compression and relaxation [-]
+    double max_velocity = 0.2;       ///< of a wall [m/s]
+    double tolerance = 0.02;         ///< of the mean pressure of each pair of walls, relative [-]
+    double unbalanced_ratio = 0.01;  ///< compression and final relaxation end below this ...
+    double kinetic_ratio = 1e-4;     ///< ... and below this kinetic / elastic energy
+    double time_limit = 0.5;         ///< compression, simulated time [s]
+    double relaxation_limit = 0.2;   ///< final relaxation, simulated time [s]
+    double drag = 50;                ///< rate at which velocities decay during compression and relaxation [1/s]
 };
 
 struct Spec {
-    Eigen::Vector3d size = Eigen::Vector3d::Zero();  ///< box, z is only the ground plan's height when nothing is compressed [m]
+    Eigen::Vector3d size = Eigen::Vector3d::Zero();  ///< box the grains are dropped into; z is the height the grains should fill [m]
     std::vector<Material> materials;
     std::vector<Population> populations;
     Dropping dropping;
     Compression compression;
     double dem_step = 0;     ///< [s]; 0: automatic
-    double step_factor = 0.2;///< of the automatic step: omega dt at the stiffest contact [-]
     Eigen::Vector3d gravity = {0, 0, -9.81};
     std::vector<std::string> warnings;  ///< odd but allowed, for the user to read
 };

@@ -1,0 +1,56 @@
+#include "pack/sample_world.h"
+
+#include <algorithm>
+
+namespace coral::pack {
+
+std::shared_ptr<const dem::Shape> make_shape(const ShapeTemplate& shape)
+{
+    if (shape.kind == ShapeKind::sphere) return dem::Shape::sphere(0.5 * shape.equivalent_diameter);
+    return dem::Shape::grid({shape.name, shape.grid, shape.nodes, shape.node_areas, shape.volume, shape.apparent_volume, shape.inertia});
+}
+
+SampleIds add_sample(dem::World& world, const Sample& sample, const std::vector<std::string>& with_walls)
+{
+    SampleIds ids;
+    for (const ShapeTemplate& shape : sample.shapes) ids.shapes.push_back(world.add_shape(make_shape(shape)));
+    for (const Material& material : sample.materials) ids.materials.push_back(world.add_material(material));
+    for (const Particle& p : sample.particles) {
+        dem::BodySpec body;
+        body.shape = ids.shapes[std::size_t(p.shape)];
+        body.material = ids.materials[std::size_t(p.material)];
+        body.role = to_string(p.role);
+        body.scale = p.scale;
+        body.position = p.position;
+        body.orientation = p.orientation;
+        body.velocity = p.velocity;
+        body.angular_velocity = p.angular_velocity;
+        ids.bodies.push_back(world.add_body(body));
+    }
+    for (const Wall& wall : sample.walls) {
+        if (std::find(with_walls.begin(), with_walls.end(), wall.name) == with_walls.end()) {
+            ids.walls.push_back(-1);
+            continue;
+        }
+        Material material = sample.materials.front();
+        material.name = "wall " + wall.name;
+        material.friction = wall.friction;
+        ids.walls.push_back(world.add_plane(wall.point, wall.normal, world.add_material(material)));
+    }
+    return ids;
+}
+
+void restore_springs(dem::World& world, const Sample& sample, const SampleIds& ids)
+{
+    std::vector<ContactSpring> springs;
+    for (ContactSpring s : sample.springs) {
+        const int wall = s.second < 0 ? ids.walls[std::size_t(-1 - s.second)] : 0;
+        if (wall < 0) continue;
+        s.first = ids.bodies[std::size_t(s.first)];
+        s.second = s.second < 0 ? -1 - wall : ids.bodies[std::size_t(s.second)];
+        springs.push_back(s);
+    }
+    world.set_contact_springs(springs);
+}
+
+}  // namespace coral::pack

@@ -1,0 +1,256 @@
+#include "pack/spec.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <set>
+
+#include "core/config.h"
+#include "core/error.h"
+#include "core/text.h"
+
+namespace coral::pack {
+namespace {
+
+void require_positive(const ConfigTable& table, const char* key, double value)
+{
+    if (!(value > 0)) table.error(key, "must be greater than zero, is " + to_text(value));
+}
+
+void require_share(const ConfigTable& table, const char* key, double value, bool zero_allowed)
+{
+    if (!(value < 1) || value < 0 || (value == 0 && !zero_allowed))
+        table.error(key, std::string("must lie between 0 and 1, is ") + to_text(value));
+}
+
+Material read_material(const ConfigTable& table, const std::string& name)
+{
+    Material m;
+    m.name = name;
+    m.density = table.quantity("density", Dimension::density, m.density);
+    m.normal_stiffness = table.quantity("normal_stiffness", Dimension::stiffness, m.normal_stiffness);
+    m.tangential_stiffness = table.quantity("tangential_stiffness", Dimension::stiffness, m.tangential_stiffness);
+    m.friction = table.quantity("friction", Dimension::number, m.friction);
+    m.damping = table.quantity("damping", Dimension::number, m.damping);
+    require_positive(table, "density", m.density);
+    require_positive(table, "normal_stiffness", m.normal_stiffness);
+    if (m.tangential_stiffness < 0) table.error("tangential_stiffness", "is negative");
+    if (m.friction < 0) table.error("friction", "is negative");
+    require_share(table, "damping", m.damping, true);
+    return m;
+}
+
+void read_gradation_table(const ConfigTable& table, Population& p)
+{
+    p.gradation = Gradation::table;
+    const ConfigTable psd = table.table("psd");
+    const auto sizes = psd.quantities("size", Dimension::length);
+    const auto passing = psd.quantities("passing", Dimension::number);
+    if (sizes.size() < 2 || sizes.size() != passing.size())
+        return psd.error("passing", std::to_string(sizes.size()) + " sizes and " + std::to_string(passing.size()) + " passings",
+                         "give both lists the same length, at least two");
+    for (std::size_t i = 0; i < sizes.size(); ++i) {
+        if (!(sizes[i] > 0)) return psd.error("size", "size " + std::to_string(i + 1) + " is not greater than zero");
+        if (i > 0 && (sizes[i] < sizes[i - 1] || passing[i] < passing[i - 1]))
+            return psd.error("size", "sizes and passings must rise from point to point; point " + std::to_string(i + 1) + " falls");
+        p.psd.push_back({sizes[i], passing[i]});
+    }
+    if (passing.front() != 0)
+        psd.error("passing", "starts at " + to_text(100 * passing.front()) + " %, not 0 %", "add the size that nothing passes");
+    if (std::abs(passing.back() - 1) > 1e-9)
+        psd.error("passing", "ends at " + to_text(100 * passing.back()) + " %, not 100 %", "add the size that everything passes");
+    p.smallest = sizes.front();
+    p.largest = sizes.back();
+}
+
+void read_diameters(const ConfigTable& table, Population& p)
+{
+    const int given = table.has("diameter") + table.has("diameters") + table.has("psd");
+    if (given > 1) table.error("diameter", "more than one of diameter, diameters and psd is given", "keep one of them");
+    if (given == 0) {
+        p.own_size = true;
+        if (p.shape == ShapeKind::sphere) table.error("diameter", "is missing", "write diameter, diameters or psd");
+    } else if (table.has("diameter")) {
+        p.smallest = p.largest = table.quantity("diameter", Dimension::length, 1.0);
+        require_positive(table, "diameter", p.smallest);
+    } else if (table.has("diameters")) {
+        p.gradation = Gradation::uniform;
+        const auto ends = table.quantities("diameters", Dimension::length);
+        if (ends.size() != 2 || !(ends[0] > 0) || !(ends[1] >= ends[0]))
+            return table.error("diameters", "takes two sizes greater than zero, the smaller one first");
+        p.smallest = ends[0];
+        p.largest = ends[1];
+    } else {
+        read_gradation_table(table, p);
+    }
+}
+
+void read_source(const ConfigTable& table, const std::filesystem::path& folder, Population& p)
+{
+    static const std::array<std::string, 5> shapes{"sphere", "level-set", "sh", "polyhedron", "superellipsoid"};
+    const std::string shape = table.choice("shape", shapes, "sphere");
+    if (shape == "polyhedron" || shape == "superellipsoid")
+        table.error("shape", "'" + shape + "' is not supported yet", "use sphere, level-set or sh");
+    p.shape = shape == "level-set" ? ShapeKind::level_set : shape == "sh" ? ShapeKind::sh : ShapeKind::sphere;
+    const std::string file = table.string("file", "");
+    if (p.shape == ShapeKind::sphere) {
+        for (const char* key : {"file", "grains"})
+            if (table.has(key)) table.error(key, "spheres take no " + std::string(key), "remove it, or set shape = \"level-set\"");
+        table.string("grains", "");
+        return;
+    }
+    if (file.empty())
+        table.error("file", "is missing", p.shape == ShapeKind::sh ? "write file = \"grains.sh.h5\"" : "write file = \"grains.vdb\"");
+    p.file = std::filesystem::path(file).is_absolute() ? std::filesystem::path(file) : folder / file;
+    if (!file.empty() && !std::filesystem::exists(p.file))
+        table.error("file", "'" + p.file.string() + "' does not exist", "paths are relative to the folder of this file");
+    if (table.is_array("grains")) {
+        p.grains = table.integers("grains");
+        if (p.grains.empty()) table.error("grains", "is an empty list", "write \"all\" or at least one id");
+    } else if (table.string("grains", "all") != "all") {
+        table.error("grains", "must be \"all\" or a list of ids");
+    }
+}
+
+Population read_population(const ConfigTable& table, const std::filesystem::path& folder, std::size_t number)
+{
+    static const std::array<std::string, 2> roles{"coarse", "fine"};
+    Population p;
+    p.role = table.choice("role", roles) == "fine" ? Role::fine : Role::coarse;
+    p.name = table.string("name", std::string(to_string(p.role)) + std::to_string(number + 1));
+    read_source(table, folder, p);
+    read_diameters(table, p);
+    if (table.has("count")) p.count = table.integer("count");
+    if (table.has("mass_fraction")) p.mass_fraction = table.quantity("mass_fraction", Dimension::number);
+    if (p.count.has_value() == p.mass_fraction.has_value())
+        table.error("count", "give either count or mass_fraction", p.count ? "remove one" : "add one of them");
+    if (p.count && *p.count <= 0) table.error("count", "must be at least 1, is " + std::to_string(*p.count));
+    if (p.mass_fraction) require_share(table, "mass_fraction", *p.mass_fraction, false);
+    p.material = table.string("material", "default");
+    p.surface_nodes = static_cast<int>(table.integer("surface_nodes", p.shape == ShapeKind::sh ? 2500 : 6000));
+    if (p.surface_nodes < 100) table.error("surface_nodes", "must be at least 100");
+    p.grid_spacing = table.quantity("grid_spacing", Dimension::length, 0.0);
+    if (p.grid_spacing < 0) table.error("grid_spacing", "is negative");
+    return p;
+}
+
+Dropping read_dropping(const ConfigTable& table)
+{
+    Dropping d;
+    d.layers = static_cast<int>(table.integer("layers", d.layers));
+    d.drop_height = table.quantity("drop_height", Dimension::length, d.drop_height);
+    d.friction = table.quantity("friction", Dimension::number, d.friction);
+    d.damping = table.quantity("damping", Dimension::number, d.damping);
+    d.stiffness_factor = table.quantity("stiffness_factor", Dimension::number, d.stiffness_factor);
+    d.drag = table.quantity("drag", Dimension::number, d.drag);
+    d.unbalanced_ratio = table.quantity("unbalanced_ratio", Dimension::number, d.unbalanced_ratio);
+    d.speed_ratio = table.quantity("speed_ratio", Dimension::number, d.speed_ratio);
+    d.time_limit = table.quantity("time_limit", Dimension::time, d.time_limit);
+    if (d.layers < 0) table.error("layers", "is negative");
+    if (d.drop_height < 0) table.error("drop_height", "is negative");
+    if (d.friction < 0) table.error("friction", "is negative");
+    if (d.drag < 0) table.error("drag", "is negative");
+    require_share(table, "damping", d.damping, true);
+    if (!(d.stiffness_factor > 0 && d.stiffness_factor <= 1))
+        table.error("stiffness_factor", "must be greater than 0 and at most 1, is " + to_text(d.stiffness_factor));
+    require_positive(table, "unbalanced_ratio", d.unbalanced_ratio);
+    require_positive(table, "speed_ratio", d.speed_ratio);
+    require_positive(table, "time_limit", d.time_limit);
+    return d;
+}
+
+Compression read_compression(const ConfigTable& table)
+{
+    static const std::array<std::string, 2> walls{"all", "top"};
+    Compression c;
+    if (table.has("pressure") && table.has("void_ratio"))
+        table.error("void_ratio", "pressure and void_ratio are both given", "keep one of them");
+    if (table.has("pressure")) {
+        c.target = CompressionTarget::pressure;
+        c.pressure = table.quantity("pressure", Dimension::pressure);
+        require_positive(table, "pressure", c.pressure);
+    } else if (table.has("void_ratio")) {
+        c.target = CompressionTarget::void_ratio;
+        c.void_ratio = table.quantity("void_ratio", Dimension::number);
+        require_positive(table, "void_ratio", c.void_ratio);
+    }
+    c.lateral = table.choice("walls", walls, "all") == "all";
+    c.friction = table.quantity("friction", Dimension::number, c.friction);
+    c.max_velocity = table.quantity("max_velocity", Dimension::velocity, c.max_velocity);
+    c.tolerance = table.quantity("tolerance", Dimension::number, c.tolerance);
+    c.unbalanced_ratio = table.quantity("unbalanced_ratio", Dimension::number, c.unbalanced_ratio);
+    c.kinetic_ratio = table.quantity("kinetic_ratio", Dimension::number, c.kinetic_ratio);
+    c.time_limit = table.quantity("time_limit", Dimension::time, c.time_limit);
+    c.relaxation_limit = table.quantity("relaxation_limit", Dimension::time, c.relaxation_limit);
+    c.drag = table.quantity("drag", Dimension::number, c.drag);
+    if (table.has("friction") && c.friction < 0) table.error("friction", "is negative");
+    if (c.drag < 0) table.error("drag", "is negative");
+    require_positive(table, "max_velocity", c.max_velocity);
+    require_positive(table, "tolerance", c.tolerance);
+    require_positive(table, "unbalanced_ratio", c.unbalanced_ratio);
+    require_positive(table, "kinetic_ratio", c.kinetic_ratio);
+    require_positive(table, "time_limit", c.time_limit);
+    require_positive(table, "relaxation_limit", c.relaxation_limit);
+    return c;
+}
+
+void check_together(const std::vector<ConfigTable>& tables, const ConfigTable& root, Spec& spec)
+{
+    std::vector<std::string> names;
+    for (const Material& m : spec.materials) names.push_back(m.name);
+    double fractions = 0;
+    bool counted = false, fine = false, coarse = false;
+    for (std::size_t i = 0; i < spec.populations.size(); ++i) {
+        const Population& p = spec.populations[i];
+        (p.role == Role::fine ? fine : coarse) = true;
+        counted = counted || p.count.has_value();
+        fractions += p.mass_fraction.value_or(0);
+        if (std::find(names.begin(), names.end(), p.material) == names.end())
+            tables[i].error("material", "there is no [material." + p.material + "]" + did_you_mean(p.material, names));
+        const double edge = spec.size.minCoeff();
+        if (p.largest >= edge && edge > 0)
+            tables[i].error("diameter", "grains of " + format_quantity(p.largest, Dimension::length) + " do not fit a box of " +
+                                            format_quantity(edge, Dimension::length), "enlarge [box] size");
+    }
+    if (spec.populations.empty()) {
+        root.error("population", "there is no [[population]]", "add at least one");
+    } else if (!counted) {
+        tables.front().error("count", "every population has a mass_fraction, so the number of grains is open", "give one a count");
+    } else if (fractions >= 1) {
+        tables.back().error("mass_fraction", "the fractions add up to " + to_text(fractions), "leave mass for the counted populations");
+    }
+    if (!fine && !spec.populations.empty()) spec.warnings.push_back("no population has role \"fine\": nothing can be eroded from this sample");
+    if (!coarse && !spec.populations.empty()) spec.warnings.push_back("no population has role \"coarse\": the sample has no skeleton");
+}
+
+}  // namespace
+
+Spec read_spec(const std::filesystem::path& file)
+{
+    const Config config = Config::from_file(file);
+    const ConfigTable root = config.root();
+    Spec spec;
+    const ConfigTable box = root.table("box");
+    spec.size = box.vector("size", Dimension::length);
+    if (box.has("size") && !(spec.size.minCoeff() > 0)) box.error("size", "every edge must be greater than zero");
+    const ConfigTable materials = root.table("material");
+    for (const std::string& name : materials.keys()) spec.materials.push_back(read_material(materials.table(name), name));
+    if (spec.materials.empty()) spec.materials.push_back({});
+    const auto tables = root.tables("population");
+    for (std::size_t i = 0; i < tables.size(); ++i)
+        spec.populations.push_back(read_population(tables[i], file.parent_path(), i));
+    spec.dropping = read_dropping(root.table("dropping"));
+    spec.compression = read_compression(root.table("compression"));
+    spec.gravity = root.table("gravity").vector("vector", Dimension::acceleration, spec.gravity);
+    if (!(spec.gravity.z() < 0)) root.table("gravity").error("vector", "grains are dropped along -z, so z must be negative");
+    const ConfigTable time = root.table("time");
+    if (!time.is_string("dem_step") || time.string("dem_step", "auto") != "auto") {
+        spec.dem_step = time.quantity("dem_step", Dimension::time, 0.0);
+        if (time.has("dem_step")) require_positive(time, "dem_step", spec.dem_step);
+    }
+    check_together(tables, root, spec);
+    config.finish();
+    return spec;
+}
+
+}  // namespace coral::pack
