@@ -19,8 +19,8 @@ struct RawLayout {
 
 /// Reads a stack: multi-page TIFF/BigTIFF, NRRD (raw, gzip), MetaImage (.mhd/.mha, raw or zlib), .raw with a layout, an
 /// HDF5 dataset ("file.h5:/dataset"), a folder of slices, or several slice files. Slices are taken in natural order.
-/// The voxel size comes from ImageJ's TIFF fields, NRRD space units, or MetaImage ElementSpacing with an
-/// ElementSpacingUnits or AnatomicalOrientation-free unit comment; otherwise it stays zero: it is never guessed.
+/// The voxel size comes from ImageJ's TIFF fields, NRRD spacings with `space units`, MetaImage ElementSpacing with
+/// DistanceUnits, or the HDF5 attribute voxel_size [m]; otherwise it stays zero: it is never guessed.
 /// \throws UsageError  a path does not exist, or a .raw file without layout
 /// \throws Error       unreadable, truncated or unsupported file (names file and page), missing slice, slices of different size
 VoxelStack read_stack(std::span<const std::string> paths, const std::optional<RawLayout>& layout = {});
