@@ -1,0 +1,278 @@
+#include "sdf/vdb_io.h"
+
+#include <openvdb/io/File.h>
+#include <openvdb/openvdb.h>
+#include <openvdb/tools/Dense.h>
+#include <openvdb/tools/Prune.h>
+
+#include <array>
+#include <charconv>
+#include <fstream>
+#include <map>
+#include <sstream>
+
+#include "core/error.h"
+#include "core/output_file.h"
+#include "core/text.h"
+
+namespace coral::sdf {
+namespace {
+
+constexpr double millimetres = 1e3;  // of one metre; the only place where lengths are not in metres
+
+using openvdb::FloatGrid;
+
+std::string grid_name(int id, bool apparent) { return "grain_" + std::to_string(id) + (apparent ? "_apparent" : ""); }
+
+/// Id of "grain_<id>" or "grain_<id>_apparent", 0 for any other name.
+int id_of(const std::string& name)
+{
+    if (name.rfind("grain_", 0) != 0) return 0;
+    int id = 0;
+    const char* end = name.data() + name.size();
+    const auto [rest, problem] = std::from_chars(name.data() + 6, end, id);
+    return problem == std::errc() && (rest == end || std::string(rest, end) == "_apparent") ? id : 0;
+}
+
+openvdb::Coord lattice_offset(const DistanceGrid& grid, const Eigen::Vector3d& origin)
+{
+    const Eigen::Vector3d steps = (grid.origin - origin) / grid.spacing;
+    return {int(std::lround(steps.x())), int(std::lround(steps.y())), int(std::lround(steps.z()))};
+}
+
+/// \param origin  of the lattice both grids of a grain share
+FloatGrid::Ptr to_vdb(const DistanceGrid& grid, const Eigen::Vector3d& origin, const std::string& name)
+{
+    if (!std::isfinite(grid.outside_limit) || !std::isfinite(grid.inside_limit)) throw Error(name, "its band has no limits; only clamped grids are stored");
+    const float outside = float(grid.outside_limit * millimetres), inside = float(grid.inside_limit * millimetres);
+    FloatGrid::Ptr vdb = FloatGrid::create(outside);
+    auto values = vdb->getAccessor();
+    const openvdb::Coord first = lattice_offset(grid, origin);
+    std::size_t n = 0;
+    for (int k = 0; k < grid.size.z(); ++k)
+        for (int j = 0; j < grid.size.y(); ++j)
+            for (int i = 0; i < grid.size.x(); ++i, ++n) {
+                const float d = float(grid.distance[n] * millimetres);
+                if (d >= outside) continue;
+                const openvdb::Coord at(first.x() + i, first.y() + j, first.z() + k);
+                if (d <= -inside) values.setValueOff(at, -inside);
+                else values.setValueOn(at, d);
+            }
+    openvdb::tools::pruneInactive(vdb->tree());
+    auto transform = openvdb::math::Transform::createLinearTransform(grid.spacing * millimetres);
+    transform->postTranslate(openvdb::Vec3d(origin.x(), origin.y(), origin.z()) * millimetres);
+    vdb->setTransform(transform);
+    vdb->setName(name);
+    vdb->setGridClass(openvdb::GRID_LEVEL_SET);
+    vdb->insertMeta("lattice_first", openvdb::Vec3IMetadata(openvdb::Vec3i(first.x(), first.y(), first.z())));
+    vdb->insertMeta("lattice_size", openvdb::Vec3IMetadata(openvdb::Vec3i(grid.size.x(), grid.size.y(), grid.size.z())));
+    vdb->insertMeta("inside_limit", openvdb::DoubleMetadata(grid.inside_limit));
+    vdb->insertMeta("outside_limit", openvdb::DoubleMetadata(grid.outside_limit));
+    return vdb;
+}
+
+void describe(FloatGrid& vdb, const GrainLevelSet& grain)
+{
+    std::string inertia;
+    for (int n = 0; n < 9; ++n) inertia += (n ? " " : "") + to_text(grain.inertia(n / 3, n % 3));
+    vdb.insertMeta("world_unit", openvdb::StringMetadata("mm"));
+    vdb.insertMeta("sign", openvdb::StringMetadata("negative in solid"));
+    vdb.insertMeta("label", openvdb::Int64Metadata(grain.label));
+    vdb.insertMeta("spacing", openvdb::DoubleMetadata(grain.solid.spacing));
+    vdb.insertMeta("volume", openvdb::DoubleMetadata(grain.volume));
+    vdb.insertMeta("apparent_volume", openvdb::DoubleMetadata(grain.apparent_volume));
+    vdb.insertMeta("equivalent_diameter", openvdb::DoubleMetadata(grain.equivalent_diameter));
+    vdb.insertMeta("intraparticle_porosity", openvdb::DoubleMetadata(grain.intraparticle_porosity));
+    vdb.insertMeta("inertia", openvdb::StringMetadata(inertia));
+    vdb.insertMeta("centre", openvdb::Vec3DMetadata(openvdb::Vec3d(grain.centre.x(), grain.centre.y(), grain.centre.z())));
+}
+
+/// OpenVDB writes a random UUID behind magic number (8 bytes), file version, library version (3 x 4) and a flag (1).
+/// It is replaced by one made from the content, so that the same grains give the same bytes.
+void make_reproducible(const std::filesystem::path& file)
+{
+    constexpr std::streamoff uuid_offset = 21, uuid_length = 36;
+    std::fstream stream(file, std::ios::in | std::ios::out | std::ios::binary);
+    std::string head(std::size_t(uuid_offset + uuid_length), '\0');
+    stream.read(head.data(), std::streamsize(head.size()));
+    const std::size_t at = std::size_t(uuid_offset);
+    if (!stream || head[at + 8] != '-' || head[at + 23] != '-') throw Error(file.string(), "unexpected header written by OpenVDB");
+    std::uint64_t hash[2] = {0xcbf29ce484222325ull, 0x9e3779b97f4a7c15ull};  // FNV-1a from two starts
+    std::vector<char> block(1 << 20);
+    while (stream.read(block.data(), std::streamsize(block.size())), stream.gcount() > 0)
+        for (std::streamsize n = 0; n < stream.gcount(); ++n)
+            for (std::uint64_t& h : hash) h = (h ^ std::uint8_t(block[std::size_t(n)])) * 0x100000001b3ull;
+    std::string uuid;
+    for (int n = 0; n < 32; ++n) {
+        if (n == 8 || n == 12 || n == 16 || n == 20) uuid += '-';
+        uuid += "0123456789abcdef"[hash[n / 16] >> (4 * (n % 16)) & 15];
+    }
+    stream.clear();
+    stream.seekp(uuid_offset);
+    stream.write(uuid.data(), uuid_length);
+    if (!stream.flush()) throw Error(file.string(), "cannot be written");
+}
+
+DistanceGrid to_dense(const FloatGrid& vdb)
+{
+    DistanceGrid grid;
+    const openvdb::Vec3i first = vdb.metaValue<openvdb::Vec3i>("lattice_first"), size = vdb.metaValue<openvdb::Vec3i>("lattice_size");
+    if (size[0] < 2 || size[1] < 2 || size[2] < 2 || std::int64_t(size[0]) * size[1] * size[2] > std::int64_t(1) << 33)
+        throw Error(vdb.getName(), "lattice_size is out of range");
+    grid.size = Eigen::Vector3i(size[0], size[1], size[2]);
+    grid.spacing = vdb.metaValue<double>("spacing");
+    const openvdb::Vec3d origin = vdb.indexToWorld(openvdb::Coord(first[0], first[1], first[2])) / millimetres;
+    grid.origin = Eigen::Vector3d(origin[0], origin[1], origin[2]);
+    grid.distance.resize(grid.node_count());
+    const openvdb::Coord low(first[0], first[1], first[2]);
+    const openvdb::CoordBBox box(low, low.offsetBy(size[0] - 1, size[1] - 1, size[2] - 1));
+    openvdb::tools::Dense<float, openvdb::tools::LayoutXYZ> dense(box, grid.distance.data());
+    openvdb::tools::copyToDense(vdb, dense, /*serial=*/true);
+    grid.outside_limit = vdb.metaValue<double>("outside_limit");
+    grid.inside_limit = vdb.metaValue<double>("inside_limit");
+    for (float& d : grid.distance) d = float(d / millimetres);
+    // A clamped value must compare as clamped after the two roundings.
+    grid.outside_limit = std::min(grid.outside_limit, double(*std::max_element(grid.distance.begin(), grid.distance.end())));
+    const double deepest = -double(*std::min_element(grid.distance.begin(), grid.distance.end()));
+    if (std::abs(deepest - grid.inside_limit) < 1e-6 * grid.inside_limit) grid.inside_limit = std::min(grid.inside_limit, deepest);
+    return grid;
+}
+
+Eigen::Matrix3d read_inertia(const FloatGrid& vdb)
+{
+    Eigen::Matrix3d inertia;
+    std::istringstream text(vdb.metaValue<std::string>("inertia"));
+    for (int n = 0; n < 9; ++n)
+        if (!(text >> inertia(n / 3, n % 3))) throw Error(vdb.getName(), "metadata inertia does not hold nine numbers");
+    return inertia;
+}
+
+/// Runs `read` and turns any complaint of OpenVDB into an Error about the file.
+template <class Read>
+auto guarded(const std::filesystem::path& file, const Read& read)
+{
+    try {
+        return read();
+    } catch (const Error&) {
+        throw;
+    } catch (const std::exception& problem) {
+        throw Error(file.string(), std::string("no readable file of grains (") + problem.what() + ")", "make it with csct2ls");
+    }
+}
+
+}  // namespace
+
+struct GrainWriter::Impl {
+    OutputFile output;
+    std::map<int, std::array<FloatGrid::Ptr, 2>> grids;
+};
+
+GrainWriter::GrainWriter(const std::filesystem::path& file) : impl_(new Impl{OutputFile(file), {}}) { openvdb::initialize(); }
+GrainWriter::~GrainWriter() = default;
+
+void GrainWriter::add(const GrainLevelSet& grain)
+{
+    if (grain.id < 1 || impl_->grids.count(grain.id)) throw Error(grid_name(grain.id, false), "ids must be positive and differ");
+    const std::array<FloatGrid::Ptr, 2> pair = {to_vdb(grain.solid, grain.solid.origin, grid_name(grain.id, false)),
+                                                to_vdb(grain.apparent, grain.solid.origin, grid_name(grain.id, true))};
+    for (const auto& vdb : pair) describe(*vdb, grain);
+    impl_->grids[grain.id] = pair;
+}
+
+void GrainWriter::commit(const History& history)
+{
+    const openvdb::StringMetadata text(to_json(history));
+    openvdb::GridCPtrVec all;
+    for (const auto& [id, pair] : impl_->grids)
+        for (const auto& vdb : pair) {
+            vdb->insertMeta("history", text);
+            all.push_back(vdb);
+        }
+    openvdb::MetaMap metadata;
+    metadata.insertMeta("history", text);
+    metadata.insertMeta("content", openvdb::StringMetadata("coralsand grains"));
+    const std::filesystem::path& file = impl_->output.temporary();
+    try {
+        openvdb::io::File vdb(file.string());
+        vdb.write(all, metadata);
+        vdb.close();
+    } catch (const std::exception& problem) {
+        throw Error(file.string(), std::string("cannot be written: ") + problem.what());
+    }
+    make_reproducible(file);
+    impl_->output.commit();
+}
+
+struct GrainReader::Impl {
+    std::filesystem::path file;
+    std::vector<int> ids;
+    History history;
+};
+
+GrainReader::GrainReader(const std::filesystem::path& file) : impl_(new Impl{file, {}, {}})
+{
+    openvdb::initialize();
+    if (!std::filesystem::is_regular_file(file)) throw Error(file.string(), "no such file");
+    guarded(file, [&] {
+        openvdb::io::File vdb(file.string());
+        vdb.open(false);
+        for (auto name = vdb.beginName(); name != vdb.endName(); ++name)
+            if (const int id = id_of(name.gridName()); id > 0 && name.gridName() == grid_name(id, false)) impl_->ids.push_back(id);
+        const auto metadata = vdb.getMetadata();
+        const auto content = metadata->getMetadata<openvdb::StringMetadata>("content");
+        if (!content || content->value() != "coralsand grains") throw Error(file.string(), "holds no grains of ours", "make it with csct2ls");
+        impl_->history = history_from_json(metadata->metaValue<std::string>("history"), file.string());
+    });
+    std::sort(impl_->ids.begin(), impl_->ids.end());
+}
+GrainReader::~GrainReader() = default;
+
+const std::vector<int>& GrainReader::ids() const { return impl_->ids; }
+const History& GrainReader::history() const { return impl_->history; }
+
+GrainLevelSet GrainReader::read(int id) const
+{
+    if (!std::binary_search(impl_->ids.begin(), impl_->ids.end(), id))
+        throw Error(impl_->file.string(), "no grid " + grid_name(id, false), "it holds " + std::to_string(impl_->ids.size()) + " grains");
+    return guarded(impl_->file, [&] {
+        openvdb::io::File vdb(impl_->file.string());  // one per call: a File is not thread-safe
+        vdb.open(false);
+        std::array<FloatGrid::Ptr, 2> pair;
+        for (int twin = 0; twin < 2; ++twin) {
+            if (!vdb.hasGrid(grid_name(id, twin == 1))) throw Error(impl_->file.string(), "no grid " + grid_name(id, twin == 1), "make it with csct2ls");
+            pair[std::size_t(twin)] = openvdb::gridPtrCast<FloatGrid>(vdb.readGrid(grid_name(id, twin == 1)));
+            if (!pair[std::size_t(twin)]) throw Error(impl_->file.string(), grid_name(id, twin == 1) + " is no grid of floats", "make it with csct2ls");
+        }
+        GrainLevelSet grain;
+        const FloatGrid& solid = *pair[0];
+        grain.id = id;
+        grain.label = std::uint32_t(solid.metaValue<std::int64_t>("label"));
+        grain.solid = to_dense(solid);
+        grain.apparent = to_dense(*pair[1]);
+        grain.volume = solid.metaValue<double>("volume");
+        grain.apparent_volume = solid.metaValue<double>("apparent_volume");
+        grain.equivalent_diameter = solid.metaValue<double>("equivalent_diameter");
+        grain.intraparticle_porosity = solid.metaValue<double>("intraparticle_porosity");
+        grain.inertia = read_inertia(solid);
+        const openvdb::Vec3d centre = solid.metaValue<openvdb::Vec3d>("centre");
+        grain.centre = Eigen::Vector3d(centre[0], centre[1], centre[2]);
+        return grain;
+    });
+}
+
+void write_grains(const std::filesystem::path& file, std::span<const GrainLevelSet> grains, const History& history)
+{
+    GrainWriter writer(file);
+    for (const GrainLevelSet& grain : grains) writer.add(grain);
+    writer.commit(history);
+}
+
+GrainFile read_grains(const std::filesystem::path& file)
+{
+    const GrainReader reader(file);
+    GrainFile result{{}, reader.history()};
+    for (const int id : reader.ids()) result.grains.push_back(reader.read(id));
+    return result;
+}
+
+}  // namespace coral::sdf
