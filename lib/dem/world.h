@@ -11,6 +11,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <span>
 #include <string>
@@ -91,6 +92,9 @@ public:
     /// Force [N] and torque about the centre of mass [N m] of something outside (the fluid); kept until set again.
     void set_external_force(int body, const Eigen::Vector3d& force, const Eigen::Vector3d& torque);
     void clear_external_forces();
+    /// Inertia that a free body carries besides its own mass, per component: fluid that moves with it [kg]. It has no weight and takes no
+    /// part in contact laws; may be negative while the sum stays positive. Not part of save(): set it again with the forces.
+    void set_added_mass(int body, const Eigen::Vector3d& added);
     ///@}
 
     /// \name Walls
@@ -146,8 +150,9 @@ public:
     void restore(std::span<const std::uint8_t> state);
     ///@}
 
+    struct Impl;  ///< of this module alone
+
 private:
-    struct Impl;
     std::unique_ptr<Impl> impl_;
 };
 

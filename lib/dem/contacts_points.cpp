@@ -1,0 +1,238 @@
+// Contact loops of spheres: against spheres and walls (closed forms) and against grids (one query at the centre).
+// Each block of the loop writes its touching contacts into its own part of `out`; sums are taken later, in order.
+#include <cmath>
+
+#include "core/parallel.h"
+#include "dem/detail/impl.h"
+
+namespace coral::dem {
+
+namespace {
+
+/// Work of a spring over the step in which it opens or closes. The trapezoid of the two forces takes kn d1 (d1 - d0)/2 where the
+/// spring holds kn d1^2/2 (d0 < 0 < d1): the excess -kn d0 d1/2 goes back to the motion; on opening the same is taken.
+void add_crossing(std::vector<Crossing>& list, Index a, Index b, double kn, double before, double now, const Vec3& normal, const Vec3& arm_b)
+{
+    const double energy = -0.5 * kn * before * now;
+    if (energy > 0.0) list.push_back({a, b, now > 0.0 ? energy : -energy, normal, arm_b});
+}
+
+}  // namespace
+
+void World::Impl::sphere_loop(double dt)
+{
+    SphereList& l = spheres;
+    const Vec3* const xs = x.data();
+    const double* const rs = radius.data();
+    parallel_blocks(l.rows.size(), row_grain, [&](std::size_t first, std::size_t last) {
+        const std::size_t block = first / row_grain;
+        LoopSums s;
+        std::vector<Crossing>& crossing = crossings[block];
+        PointForce* const begin = l.out.data() + l.row[first];
+        PointForce* out = begin;
+        for (std::size_t r = first; r < last; ++r) {
+            const std::size_t i = std::size_t(l.rows[r]);
+            const Vec3 xi = xs[i];
+            const double ri = rs[i];
+            for (Index k = l.row[r]; k < l.row[r + 1]; ++k) {
+                const std::size_t j = std::size_t(l.other[k]);
+                const Vec3 d = periodic(xi - xs[j]);
+                const double reach = ri + rs[j], d2 = d.squaredNorm();
+                if (d2 >= reach * reach && l.touch[k] == 0) continue;
+                const PairLaw& pair = law(material[i], material[j]);
+                const double length = std::sqrt(d2);
+                const Vec3 n = length > 0.0 ? Vec3(d / length) : Vec3::UnitZ();
+                const double overlap = reach - length;
+                const Vec3 relative = v[i] - v[j];
+                const bool touching = overlap > 0.0;
+                if (touching != (l.touch[k] != 0) && dt > 0.0 && l.touch[k] != 2)
+                    add_crossing(crossing, Index(i), Index(j), pair.kn, reach - (d - relative * dt).norm(), overlap, n, Vec3::Zero());
+                if (!touching) {
+                    s.friction += 0.5 * pair.kt * l.spring[k].squaredNorm();
+                    l.spring[k].setZero();
+                    l.touch[k] = 0;
+                    continue;
+                }
+                const double smaller = std::min(ri, rs[j]), cap = options.overlap_cap * smaller;
+                const double pressed = std::min(overlap, cap);
+                const double reduced = 1.0 / (inverse_mass[i] + inverse_mass[j]);
+                const double approach = -relative.dot(n);
+                const double fn = normal_force(pair.kn * pressed, approach, pair.kn, pair.damping, reduced, dt, s);
+                const double arm_i = ri - 0.5 * overlap, arm_j = rs[j] - 0.5 * overlap;
+                const Vec3 slide = relative + approach * n - (arm_i * w[i] + arm_j * w[j]).cross(n);
+                out->tangential = tangential_force(pair, fn, n, slide, 0.5 * (w[i] + w[j]).dot(n), reduced, dt, 1.0, l.spring[k], s);
+                out->a = Index(i);
+                out->b = Index(j);
+                out->normal = n;
+                out->force = fn;
+                out->overlap = overlap;
+                out->arm_a = arm_i;
+                out->arm_b = arm_j;
+                ++out;
+                l.touch[k] = fn > 0.0 ? 1 : 2;
+                s.elastic_normal += pair.kn * pressed * (overlap - 0.5 * pressed);
+                s.max_overlap = std::max(s.max_overlap, overlap / smaller);
+                s.deep += overlap > cap;
+            }
+        }
+        s.tests = l.row[last] - l.row[first];
+        s.touching = out - begin;
+        out_count[0][block] = std::int32_t(out - begin);
+        block_sums[block] = s;
+    });
+}
+
+void World::Impl::sphere_wall_loop(double dt)
+{
+    SphereWallList& l = sphere_walls;
+    const std::size_t base = (spheres.rows.size() + row_grain - 1) / row_grain;
+    parallel_blocks(l.body.size(), entry_grain, [&](std::size_t first, std::size_t last) {
+        const std::size_t block = first / entry_grain;
+        LoopSums s;
+        std::vector<Crossing>& crossing = crossings[base + block];
+        PointForce* const begin = l.out.data() + first;
+        PointForce* out = begin;
+        for (std::size_t k = first; k < last; ++k) {
+            const std::size_t i = std::size_t(l.body[k]);
+            const WallData& wall = walls[std::size_t(l.wall[k])];
+            const double ri = radius[i];
+            Vec3 n = wall.normal;
+            double distance = 0.0;
+            bool facing = true;
+            if (wall.kind == WallData::Kind::plane) distance = n.dot(x[i] - wall.point);
+            else facing = wall.plate.feature(l.feature[k], x[i], distance, n);
+            const double overlap = facing ? ri - distance : -1.0;
+            const bool touching = overlap > 0.0;
+            if (!touching && l.touch[k] == 0) continue;
+            const PairLaw& pair = law(material[i], wall.material);
+            const Vec3 relative = v[i] - wall.velocity;
+            const double approach = -relative.dot(n);
+            if (touching != (l.touch[k] != 0) && dt > 0.0 && facing && l.touch[k] != 2)
+                add_crossing(crossing, Index(i), -1 - l.wall[k], pair.kn, overlap - approach * dt, overlap, n, Vec3::Zero());
+            if (!touching) {
+                s.friction += 0.5 * pair.kt * l.spring[k].squaredNorm();
+                l.spring[k].setZero();
+                l.touch[k] = 0;
+                continue;
+            }
+            const double cap = options.overlap_cap * ri, pressed = std::min(overlap, cap);
+            const double reduced = mass[i];
+            const double fn = normal_force(pair.kn * pressed, approach, pair.kn, pair.damping, reduced, dt, s);
+            const double arm = ri - overlap;
+            const Vec3 slide = relative + approach * n - (arm * w[i]).cross(n);
+            out->tangential = tangential_force(pair, fn, n, slide, 0.5 * w[i].dot(n), reduced, dt, 1.0, l.spring[k], s);
+            out->a = Index(i);
+            out->b = -1 - l.wall[k];
+            out->normal = n;
+            out->force = fn;
+            out->overlap = overlap;
+            out->arm_a = arm;
+            out->arm_b = 0.0;
+            ++out;
+            l.touch[k] = fn > 0.0 ? 1 : 2;
+            s.elastic_normal += pair.kn * pressed * (overlap - 0.5 * pressed);
+            s.max_overlap = std::max(s.max_overlap, overlap / ri);
+            s.deep += overlap > cap;
+        }
+        s.tests = std::int64_t(last - first);
+        s.touching = out - begin;
+        out_count[1][block] = std::int32_t(out - begin);
+        block_sums[base + block] = s;
+    });
+}
+
+namespace {
+
+/// Slot of the wall with this normal (frame of the grid): within 37 degrees of it, or a new one.
+int slot_of(Slots& slots, const Vec3& normal)
+{
+    for (int k = 0; k < Slots::count; ++k)
+        if ((slots.used >> k & 1) && slots.normal[k].dot(normal) > 0.8) {
+            slots.normal[k] = normal;
+            return k;
+        }
+    int k = 0;
+    while (k < Slots::count && (slots.used >> k & 1)) ++k;
+    if (k == Slots::count) {
+        k = slots.next;
+        slots.next = std::uint8_t((slots.next + 1) % Slots::count);
+    }
+    slots.used = std::uint8_t(slots.used | 1 << k);
+    slots.spring[k].setZero();
+    slots.normal[k] = normal;
+    return k;
+}
+
+}  // namespace
+
+void World::Impl::sphere_grid_loop(double dt)
+{
+    SphereGridList& l = sphere_grids;
+    const std::size_t base = (spheres.rows.size() + row_grain - 1) / row_grain + (sphere_walls.body.size() + entry_grain - 1) / entry_grain;
+    parallel_blocks(l.sphere.size(), grid_grain, [&](std::size_t first, std::size_t last) {
+        const std::size_t block = first / grid_grain;
+        LoopSums s;
+        std::vector<Crossing>& crossing = crossings[base + block];
+        GeneralForce* const begin = l.out.data() + first;
+        GeneralForce* out = begin;
+        for (std::size_t k = first; k < last; ++k) {
+            const std::size_t i = std::size_t(l.sphere[k]), j = std::size_t(l.grid[k]);
+            const Vec3 offset = periodic(x[i] - x[j]);
+            const sdf::DistanceGrid& field = shapes[std::size_t(shape[j])]->distance_grid();
+            Vec3 local_gradient;
+            const Vec3 local = q[j].conjugate() * offset;
+            const double overlap = radius[i] - scale[j] * field.sample_with_gradient(local / scale[j], local_gradient);
+            const bool touching = overlap > 0.0;
+            if (!touching && l.touch[k] == 0) continue;
+            const PairLaw& pair = law(material[i], material[j]);
+            const double slope = local_gradient.norm();
+            const Vec3 local_normal = slope > 1e-9 ? Vec3(local_gradient / slope) : Vec3::UnitZ();
+            const Vec3 n = q[j] * local_normal;
+            const Vec3 arm_j = offset - n * (radius[i] - 0.5 * overlap);  // contact point, from the grid's centre
+            const Vec3 relative = v[i] - v[j] - w[j].cross(offset);
+            if (touching != (l.touch[k] != 0) && dt > 0.0 && l.touch[k] != 2) {
+                // Where the centre was against the grid a step ago: the rigid motion of the pair taken back.
+                const Vec3 before = q[j].conjugate() * Vec3(offset - relative * dt);
+                const double past = radius[i] - scale[j] * field.sample(before / scale[j]);
+                add_crossing(crossing, Index(i), Index(j), pair.kn, past, overlap, n, offset);
+            }
+            if (!touching) {
+                for (int slot = 0; slot < Slots::count; ++slot)
+                    if (l.slots[k].used >> slot & 1) s.friction += 0.5 * pair.kt * l.slots[k].spring[slot].squaredNorm();
+                l.slots[k].used = 0;
+                l.touch[k] = 0;
+                continue;
+            }
+            const double cap = options.overlap_cap * radius[i], pressed = std::min(overlap, cap);
+            const double reduced = 1.0 / (inverse_mass[i] + inverse_mass[j]);
+            const double approach = -relative.dot(n);
+            const double fn = normal_force(pair.kn * pressed * slope, approach, pair.kn, pair.damping, reduced, dt, s);
+            const double arm_i = radius[i] - 0.5 * overlap;
+            const Vec3 velocity = v[i] - v[j] - arm_i * w[i].cross(n) - w[j].cross(arm_j);
+            const Vec3 slide = velocity - n.dot(velocity) * n;
+            Slots& slots = l.slots[k];
+            const int slot = slot_of(slots, local_normal);
+            const Vec3 ft = tangential_force(pair, fn, n, slide, 0.5 * (w[i] + w[j]).dot(n), reduced, dt, 1.0, slots.spring[slot], s);
+            out->a = Index(i);
+            out->b = Index(j);
+            out->points = 1;
+            out->overlap = overlap;
+            out->normal_force = fn * n;
+            out->tangential_force = ft;
+            out->torque_a = -arm_i * n.cross(ft);
+            out->torque_b = -arm_j.cross(out->normal_force + ft);
+            out->arm = -arm_i * n;
+            ++out;
+            l.touch[k] = fn > 0.0 ? 1 : 2;
+            s.elastic_normal += pair.kn * pressed * (overlap - 0.5 * pressed);
+            s.max_overlap = std::max(s.max_overlap, overlap / radius[i]);
+            s.deep += overlap > cap;
+        }
+        s.tests = std::int64_t(last - first);
+        s.touching = out - begin;
+        out_count[2][block] = std::int32_t(out - begin);
+        block_sums[base + block] = s;
+    });
+}
+
+}  // namespace coral::dem

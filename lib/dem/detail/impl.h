@@ -1,0 +1,194 @@
+#pragma once
+/// \file dem/detail/impl.h
+/// The inside of a World: state as structure of arrays, neighbour lists, and the results of the contact loops.
+#include <chrono>
+#include <cstdint>
+#include <map>
+#include <vector>
+
+#include "dem/detail/contact_law.h"
+#include "dem/detail/plate.h"
+#include "dem/world.h"
+
+namespace coral::dem {
+
+using detail::LoopSums;
+using detail::PairLaw;
+using detail::Vec3;
+using Quat = Eigen::Quaterniond;
+using Index = std::int32_t;
+
+struct WallData {
+    enum class Kind : std::uint8_t { plane, plate } kind = Kind::plane;
+    Vec3 point = Vec3::Zero(), normal = Vec3::UnitZ(), velocity = Vec3::Zero(), force = Vec3::Zero();
+    Vec3 reference = Vec3::Zero();  ///< point when the lists were made
+    detail::Plate plate;
+    int material = 0;
+};
+
+/// One-point contact of a sphere with a sphere or a wall, as the loops leave it for summation and reports.
+struct PointForce {
+    Index a, b;                 ///< b < 0: wall -1 - b
+    Vec3 normal, tangential;    ///< unit, from b to a; force on a
+    double force, overlap;      ///< normal force; depth
+    double arm_a, arm_b;        ///< distance of the contact point from the centres along the normal
+};
+
+/// Any other contact (sphere on grid, nodes): forces and torques of both sides. points == 0: nothing touches.
+struct GeneralForce {
+    Index a, b;
+    std::int32_t points = 0;
+    double overlap = 0;
+    Vec3 normal_force = Vec3::Zero(), tangential_force = Vec3::Zero(), torque_a = Vec3::Zero(), torque_b = Vec3::Zero();
+    Vec3 arm = Vec3::Zero();  ///< contact point - position of a
+};
+
+/// Correction of the work of a spring in the step in which its contact opens or closes (see integrate.cpp).
+struct Crossing {
+    Index a, b;
+    double energy;  ///< to give to (> 0) or take from (< 0) the relative motion along the normal
+    Vec3 normal, arm_b;
+};
+
+/// Half list of sphere pairs in compressed rows: partners of sphere i are other[row[i]..row[i+1]), ascending.
+struct SphereList {
+    std::vector<Index> row, other;
+    std::vector<Vec3> spring;
+    std::vector<std::uint8_t> touch;  ///< 0 apart, 1 touching, 2 touching without force (clamped)
+    std::vector<PointForce> out;
+    std::vector<Index> rows;  ///< spheres with partners
+};
+
+struct SphereWallList {
+    std::vector<Index> body, wall;
+    std::vector<std::uint8_t> feature, touch;
+    std::vector<Vec3> spring;
+    std::vector<PointForce> out;
+};
+
+/// Up to three friction springs per pair, keyed by the normal in the frame of the grid: a sphere that rests on two walls of a groove
+/// changes its nearest wall from step to step, and each wall keeps its spring.
+struct Slots {
+    static constexpr int count = 3;
+    Vec3 spring[count], normal[count];
+    std::uint8_t used = 0, next = 0;
+};
+struct SphereGridList {
+    std::vector<Index> sphere, grid;
+    std::vector<std::uint8_t> touch;
+    std::vector<Slots> slots;
+    std::vector<GeneralForce> out;
+};
+
+/// Nodes of `slave` that are near `master` (a grid, or wall -1 - master).
+struct NodeList {
+    std::vector<Index> slave, master, start;  ///< start has one more entry
+    std::vector<Index> node;
+    std::vector<Vec3> spring;
+    std::vector<std::uint8_t> touch;
+    std::vector<Vec3> gradient;               ///< scratch of the loop, world frame
+    std::vector<double> force, depth;         ///< scratch of the loop
+    std::vector<double> share;                ///< 1, or 1/2 for the two directions of a pair
+    std::vector<GeneralForce> out;
+};
+
+constexpr std::size_t row_grain = 256, entry_grain = 512, grid_grain = 256, node_grain = 4;
+
+struct World::Impl {
+    WorldOptions options;
+    std::vector<std::shared_ptr<const Shape>> shapes;
+    std::vector<Material> materials;
+    std::vector<PairLaw> laws;  ///< materials x materials
+    std::vector<WallData> walls;
+    detail::Periodic periodic;
+
+    // Bodies.
+    std::vector<Vec3> x, v, w, momentum;  ///< momentum: angular, world frame
+    std::vector<Quat> q;
+    std::vector<Vec3> force, torque;      ///< of contacts
+    std::vector<Vec3> external_force, external_torque;
+    std::vector<Vec3> added_mass;         ///< inertia of the fluid that moves with a body, per component [kg]; empty or one per body
+    std::vector<double> mass, inverse_mass, inverse_inertia;  ///< inverses are 0 unless free; the second for spheres
+    std::vector<Vec3> principal;          ///< principal moments [kg m2]
+    std::vector<double> radius;           ///< sphere radius, or bounding radius of a grid
+    std::vector<double> equivalent, scale, density;
+    std::vector<Index> shape, material;
+    std::vector<Motion> motion;
+    std::vector<std::uint8_t> in, is_grid;
+    std::vector<std::string> role;
+    int active = 0;
+
+    // Lists.
+    bool lists_valid = false, forces_valid = false;
+    double skin = 0;
+    std::vector<Vec3> x_reference;
+    std::vector<Quat> q_reference;
+    SphereList spheres;
+    SphereWallList sphere_walls;
+    SphereGridList sphere_grids;
+    NodeList nodes;
+
+    // Results of the last force computation.
+    std::vector<std::int32_t> out_count[3];  ///< per block of spheres, sphere_walls, sphere_grids
+    std::vector<LoopSums> block_sums;
+    std::vector<std::vector<Crossing>> crossings;  ///< per block
+    LoopSums sums;
+    double time = 0;
+    double dissipated_friction = 0, dissipated_damping = 0, gravity_work = 0, external_work = 0, wall_work = 0, initial = 0;
+    bool ledger_started = false;
+    Counters counters;
+
+    bool free(std::size_t i) const { return in[i] && motion[i] == Motion::free; }
+    const PairLaw& law(Index material_a, Index material_b) const
+    {
+        return laws[std::size_t(material_a) * materials.size() + std::size_t(material_b)];
+    }
+    void update_laws();
+    void update_mass(std::size_t i);
+    /// w from the angular momentum of a grid.
+    void update_spin(std::size_t i);
+    void set_spin(std::size_t i, const Vec3& angular_velocity);
+    Vec3 apply_inverse_inertia(std::size_t i, const Vec3& torque) const;
+    double kinetic_energy(std::size_t i) const;
+    double kinetic_energy() const;
+    std::string name(std::size_t i) const;
+
+    // lists.cpp
+    void make_lists();
+    void drop_contacts(Index body);
+    bool lists_expired() const;
+
+    // contacts_*.cpp: forces at the present positions; springs advance by dt.
+    void compute_contacts(double dt);
+    void sphere_loop(double dt);
+    void sphere_wall_loop(double dt);
+    void sphere_grid_loop(double dt);
+    void node_loop(double dt);
+    void sum_forces();
+    void refresh_forces();
+
+    // integrate.cpp
+    void check_step(double dt) const;
+    void kick(double dt);
+    void kick_with_added_mass(std::size_t i, double dt);
+    void drift(double dt);
+    void correct_crossings();
+    void check_numbers() const;
+    void constraint_work(double dt);
+    void step(double dt);
+    double critical_step() const;
+};
+
+/// Broad phase: pairs a < b of active bodies with |x_a - x_b| < radius_a + radius_b + skin, ordered; pairs of bodies that both do not
+/// move freely are left out. Cells by size class (factor 2), so that wide gradations cost no more than narrow ones.
+struct BroadPair {
+    Index a, b;
+};
+std::vector<BroadPair> broad_phase(const World::Impl& world, double skin);
+
+inline double seconds_since(std::chrono::steady_clock::time_point start)
+{
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+}  // namespace coral::dem

@@ -1,0 +1,264 @@
+// Motion in time: velocity Verlet, exact rotations about principal axes, guards.
+#include <cmath>
+#include <limits>
+
+#include "core/error.h"
+#include "core/text.h"
+#include "dem/detail/impl.h"
+
+namespace coral::dem {
+
+namespace {
+
+/// Turn by a small angle, second order and of unit length: enough for spheres, whose orientation is for looking at only.
+void turn_sphere(Quat& q, const Vec3& turn)
+{
+    const Vec3 h = 0.5 * turn;
+    const Quat step(1.0, h.x(), h.y(), h.z());
+    q = step * q;
+    q.normalize();
+}
+
+/// Rotates the body-frame angular momentum about axis k by the flow of b_k^2/(2 I_k) over time t; `turn` gathers the rotation of the body.
+void spin_about(int k, double t, const Vec3& inverse_moment, Vec3& b, Quat& turn)
+{
+    const double angle = b[k] * inverse_moment[k] * t;
+    const double c = std::cos(angle), s = std::sin(angle);
+    const int m = (k + 1) % 3, n = (k + 2) % 3;
+    const double bm = b[m], bn = b[n];
+    b[m] = c * bm + s * bn;
+    b[n] = c * bn - s * bm;
+    Quat axis = Quat::Identity();
+    axis.w() = std::cos(0.5 * angle);
+    axis.vec()[k] = std::sin(0.5 * angle);
+    turn = turn * axis;
+}
+
+/// Free rotation over dt with constant world angular momentum: five exact rotations, symmetric, symplectic.
+Quat free_rotation(const Quat& principal_to_world, const Vec3& momentum, const Vec3& moments, double dt)
+{
+    const Vec3 inverse = moments.cwiseInverse();
+    Vec3 b = principal_to_world.conjugate() * momentum;
+    Quat turn = Quat::Identity();
+    spin_about(0, 0.5 * dt, inverse, b, turn);
+    spin_about(1, 0.5 * dt, inverse, b, turn);
+    spin_about(2, dt, inverse, b, turn);
+    spin_about(1, 0.5 * dt, inverse, b, turn);
+    spin_about(0, 0.5 * dt, inverse, b, turn);
+    return (principal_to_world * turn).normalized();
+}
+
+}  // namespace
+
+double World::Impl::critical_step() const
+{
+    double least = std::numeric_limits<double>::infinity();
+    for (std::size_t i = 0; i < x.size(); ++i) {
+        if (!free(i)) continue;
+        double stiffness = 0.0;
+        for (std::size_t m = 0; m < materials.size(); ++m) {
+            const PairLaw& pair = law(material[i], Index(m));
+            // A tangential spring moves a sphere 3.5 times as easily as its mass alone would let it.
+            stiffness = std::max({stiffness, 2.0 * pair.kn, 3.5 * pair.kt});
+        }
+        least = std::min(least, mass[i] / stiffness);
+    }
+    return std::sqrt(least);
+}
+
+void World::Impl::check_step(double dt) const
+{
+    if (!(dt > 0.0) || !std::isfinite(dt)) throw Error("time step", to_text(dt) + " s is not positive", "give a positive step");
+    const double critical = critical_step();
+    if (dt > 1.5 * critical && !options.force_step)
+        throw Error("time step", to_text(dt) + " s is above 1.5 of the critical step " + to_text(critical) + " s (sqrt(m/2kn) of the lightest body)",
+                    "use " + to_text(options.step_fraction * critical) + " s (automatic) or a smaller stiffness");
+}
+
+void World::Impl::kick(double dt)
+{
+    const Vec3 g_dt = options.gravity * dt;
+    for (std::size_t i = 0; i < x.size(); ++i) {
+        if (inverse_mass[i] == 0.0 || !in[i]) continue;
+        if (i < added_mass.size() && added_mass[i] != Vec3::Zero())
+            kick_with_added_mass(i, dt);
+        else
+            v[i] += (inverse_mass[i] * dt) * (force[i] + external_force[i]) + g_dt;
+        const Vec3 impulse = dt * (torque[i] + external_torque[i]);
+        if (is_grid[i]) {
+            momentum[i] += impulse;
+            update_spin(i);
+        } else {
+            w[i] += inverse_inertia[i] * impulse;
+        }
+    }
+}
+
+// (m + added) dv = dt (forces + m g), component by component. The energy that the added mass takes up counts as work done outside.
+void World::Impl::kick_with_added_mass(std::size_t i, double dt)
+{
+    const Vec3 before = v[i];
+    const Vec3 inertia = added_mass[i].array() + mass[i];
+    v[i] += (dt * (force[i] + external_force[i] + mass[i] * options.gravity)).cwiseQuotient(inertia);
+    external_work -= 0.5 * added_mass[i].dot(v[i].cwiseAbs2() - before.cwiseAbs2());
+}
+
+void World::Impl::drift(double dt)
+{
+    double finite = 0.0;
+    for (std::size_t i = 0; i < x.size(); ++i) {
+        if (!in[i] || motion[i] == Motion::fixed) continue;
+        const Vec3 way = dt * v[i];
+        x[i] += way;
+        finite += v[i].squaredNorm() + w[i].squaredNorm();
+        if (motion[i] == Motion::free) {
+            gravity_work += mass[i] * options.gravity.dot(way);
+            external_work += external_force[i].dot(way) + dt * external_torque[i].dot(w[i]);
+        }
+        if (!is_grid[i]) {
+            turn_sphere(q[i], dt * w[i]);
+        } else if (motion[i] == Motion::free) {
+            const Quat& frame = shapes[std::size_t(shape[i])]->principal_rotation();
+            q[i] = free_rotation(q[i] * frame, momentum[i], principal[i], dt) * frame.conjugate();
+            update_spin(i);
+        } else {
+            const double angle = w[i].norm() * dt;
+            if (angle > 0.0) q[i] = (Quat(Eigen::AngleAxisd(angle, w[i].normalized())) * q[i]).normalized();
+        }
+    }
+    for (WallData& wall : walls) wall.point += dt * wall.velocity;
+    if (!std::isfinite(finite)) check_numbers();
+}
+
+void World::Impl::check_numbers() const
+{
+    for (std::size_t i = 0; i < x.size(); ++i)
+        if (in[i] && !(x[i].allFinite() && v[i].allFinite() && w[i].allFinite() && std::isfinite(v[i].squaredNorm() + w[i].squaredNorm())))
+            throw Error(name(i), "position or velocity is no number at " + to_text(time) + " s",
+                        "use a smaller time step, or look for a deep overlap or a bad force at the start");
+}
+
+// Half of the power that walls and bodies with given motion exchange with the rest, over dt.
+void World::Impl::constraint_work(double dt)
+{
+    for (const WallData& wall : walls) wall_work -= 0.5 * dt * wall.force.dot(wall.velocity);
+    for (std::size_t i = 0; i < x.size(); ++i)
+        if (in[i] && motion[i] == Motion::prescribed) wall_work -= 0.5 * dt * (force[i].dot(v[i]) + torque[i].dot(w[i]));
+}
+
+// Velocity Verlet does the work of a linear spring exactly as long as the spring is closed at both ends of a step: the trapezoid of a
+// linear force is exact, and its shadow term dt^2 F^2/(8m) cancels over a contact. Only in the step that opens or closes a contact
+// does it err, by up to (omega dt)^2/4 of the energy with the sign of chance, which a bouncing body gathers like a random walk.
+// The error is known from the two overlaps, and goes to the relative motion along the normal as an impulse: two elastic spheres
+// then keep their energy for any number of bounces and any stable step.
+void World::Impl::correct_crossings()
+{
+    for (const std::vector<Crossing>& list : crossings)
+        for (const Crossing& c : list) {
+            const std::size_t a = std::size_t(c.a);
+            double inverse = inverse_mass[a];
+            Vec3 relative = v[a];
+            if (c.b < 0) {
+                relative -= walls[std::size_t(-1 - c.b)].velocity;
+            } else {
+                const std::size_t b = std::size_t(c.b);
+                relative -= v[b] + w[b].cross(c.arm_b);
+                inverse += inverse_mass[b];
+                if (is_grid[b] && motion[b] == Motion::free) {
+                    const Vec3 lever = c.arm_b.cross(c.normal);
+                    inverse += lever.dot(apply_inverse_inertia(b, lever));
+                }
+            }
+            const double speed = relative.dot(c.normal);
+            if (speed == 0.0) continue;
+            const double corrected = std::copysign(std::sqrt(std::max(speed * speed + 2.0 * c.energy * inverse, 0.0)), speed);
+            const Vec3 impulse = (corrected - speed) / inverse * c.normal;
+            v[a] += inverse_mass[a] * impulse;
+            if (c.b < 0) continue;
+            const std::size_t b = std::size_t(c.b);
+            v[b] -= inverse_mass[b] * impulse;
+            if (is_grid[b] && motion[b] == Motion::free) {
+                momentum[b] -= c.arm_b.cross(impulse);
+                update_spin(b);
+            }
+        }
+}
+
+void World::Impl::step(double dt)
+{
+    refresh_forces();
+    if (!ledger_started) {
+        initial = kinetic_energy() + sums.elastic_normal + sums.elastic_tangential;
+        dissipated_friction = dissipated_damping = gravity_work = external_work = wall_work = 0.0;
+        ledger_started = true;
+    }
+    auto start = std::chrono::steady_clock::now();
+    constraint_work(dt);
+    kick(0.5 * dt);
+    drift(dt);
+    const bool expired = lists_expired();
+    counters.seconds_integration += seconds_since(start);
+    if (expired) make_lists();
+    compute_contacts(dt);
+    start = std::chrono::steady_clock::now();
+    kick(0.5 * dt);
+    correct_crossings();
+    constraint_work(dt);
+    time += dt;
+    ++counters.steps;
+    counters.seconds_integration += seconds_since(start);
+}
+
+void World::step(double dt)
+{
+    impl_->check_step(dt);
+    impl_->step(dt);
+}
+
+int World::advance(double duration, double dt)
+{
+    if (!(duration > 0.0)) return 0;
+    double longest = dt > 0.0 ? dt : impl_->options.step_fraction * impl_->critical_step();
+    if (!(longest < duration)) longest = duration;
+    const double count = std::ceil(duration / longest * (1.0 - 1e-12));
+    if (!(count < 2e9)) throw Error("time step", to_text(longest) + " s is too small for " + to_text(duration) + " s", "use a larger step");
+    const double step = duration / count;
+    impl_->check_step(step);
+    const double end = impl_->time + duration;
+    for (int k = 0; k < int(count); ++k) impl_->step(step);
+    impl_->time = end;  // not the sum of rounded steps
+    return int(count);
+}
+
+int World::relax(double overlap, int max_iterations)
+{
+    Impl& m = *impl_;
+    constexpr double rate = 0.2, longest = 0.05;  // of the way that would close a lone spring; of the radius
+    int iteration = 0;
+    for (;; ++iteration) {
+        for (std::size_t i = 0; i < m.x.size(); ++i)
+            if (m.free(i)) {
+                m.v[i].setZero();
+                m.set_spin(i, Vec3::Zero());
+            }
+        m.forces_valid = false;
+        if (m.lists_valid && m.lists_expired()) m.lists_valid = false;
+        m.refresh_forces();
+        if (m.sums.max_overlap <= overlap || iteration >= max_iterations) break;
+        for (std::size_t i = 0; i < m.x.size(); ++i) {
+            if (!m.free(i)) continue;
+            const double stiffness = m.law(m.material[i], m.material[i]).kn, r = m.equivalent[i];
+            Vec3 way = rate / stiffness * m.force[i];
+            if (way.norm() > longest * r) way *= longest * r / way.norm();
+            m.x[i] += way;
+            if (!m.is_grid[i]) continue;
+            Vec3 turn = rate / (stiffness * r * r) * m.torque[i];
+            if (turn.norm() > longest) turn *= longest / turn.norm();
+            if (turn.norm() > 0.0) m.q[i] = (Quat(Eigen::AngleAxisd(turn.norm(), turn.normalized())) * m.q[i]).normalized();
+        }
+    }
+    m.ledger_started = false;
+    return iteration;
+}
+
+}  // namespace coral::dem

@@ -1,0 +1,265 @@
+// Neighbour lists with skin: made anew when a body may have come within reach unseen, with the friction springs carried over.
+#include <algorithm>
+#include <cmath>
+
+#include "core/error.h"
+#include "core/text.h"
+#include "dem/detail/impl.h"
+
+namespace coral::dem {
+
+namespace {
+
+/// Share of the skin that a body may move before the lists are made anew: below one half, for trilinear distances may rise
+/// a little faster than the way.
+constexpr double free_path = 0.4;
+
+std::uint64_t key_of(Index a, Index b) { return std::uint64_t(std::uint32_t(a)) << 32 | std::uint32_t(b); }
+
+void make_sphere_list(World::Impl& world, const std::vector<BroadPair>& pairs)
+{
+    SphereList old = std::move(world.spheres);
+    SphereList& l = world.spheres;
+    l = {};
+    l.row.push_back(0);
+    std::size_t old_row = 0;
+    for (std::size_t p = 0; p < pairs.size();) {
+        const Index a = pairs[p].a;
+        const std::size_t begin = l.other.size();
+        std::size_t end = p;
+        for (; end < pairs.size() && pairs[end].a == a; ++end)
+            if (!world.is_grid[std::size_t(a)] && !world.is_grid[std::size_t(pairs[end].b)]) l.other.push_back(pairs[end].b);
+        p = end;
+        if (l.other.size() == begin) continue;
+        l.rows.push_back(a);
+        l.row.push_back(Index(l.other.size()));
+        l.spring.resize(l.other.size(), Vec3::Zero());
+        l.touch.resize(l.other.size(), 0);
+        while (old_row < old.rows.size() && old.rows[old_row] < a) ++old_row;
+        if (old_row == old.rows.size() || old.rows[old_row] != a) continue;
+        Index k = old.row[old_row];
+        for (std::size_t m = begin; m < l.other.size(); ++m) {
+            while (k < old.row[old_row + 1] && old.other[std::size_t(k)] < l.other[m]) ++k;
+            if (k == old.row[old_row + 1]) break;
+            if (old.other[std::size_t(k)] != l.other[m]) continue;
+            l.spring[m] = old.spring[std::size_t(k)];
+            l.touch[m] = old.touch[std::size_t(k)];
+        }
+    }
+    l.out.resize(l.other.size());
+}
+
+void make_sphere_wall_list(World::Impl& world, double skin)
+{
+    SphereWallList old = std::move(world.sphere_walls);
+    SphereWallList& l = world.sphere_walls;
+    l = {};
+    std::size_t k = 0;
+    for (std::size_t i = 0; i < world.x.size(); ++i) {
+        if (world.is_grid[i] || !world.free(i)) continue;
+        for (std::size_t wall = 0; wall < world.walls.size(); ++wall) {
+            const WallData& data = world.walls[wall];
+            Vec3 gradient;
+            const bool plane = data.kind == WallData::Kind::plane;
+            const double distance = plane ? data.normal.dot(world.x[i] - data.point) : data.plate.distance_and_gradient(world.x[i], gradient);
+            if (distance >= world.radius[i] + skin) continue;
+            for (int feature = 0; feature < (plane ? 1 : detail::Plate::features); ++feature) {
+                l.body.push_back(Index(i));
+                l.wall.push_back(Index(wall));
+                l.feature.push_back(std::uint8_t(feature));
+                const auto before = [&](std::size_t m) {
+                    if (old.body[m] != Index(i)) return old.body[m] < Index(i);
+                    if (old.wall[m] != Index(wall)) return old.wall[m] < Index(wall);
+                    return old.feature[m] < feature;
+                };
+                while (k < old.body.size() && before(k)) ++k;
+                const bool same = k < old.body.size() && old.body[k] == Index(i) && old.wall[k] == Index(wall) && old.feature[k] == feature;
+                l.spring.push_back(same ? old.spring[k] : Vec3::Zero());
+                l.touch.push_back(same ? old.touch[k] : std::uint8_t{0});
+            }
+        }
+    }
+    l.out.resize(l.body.size());
+}
+
+void make_sphere_grid_list(World::Impl& world, const std::vector<BroadPair>& pairs, double skin)
+{
+    SphereGridList old = std::move(world.sphere_grids);
+    SphereGridList& l = world.sphere_grids;
+    l = {};
+    std::vector<BroadPair> mixed;  // a: sphere, b: grid
+    for (const BroadPair& pair : pairs) {
+        const bool a = world.is_grid[std::size_t(pair.a)], b = world.is_grid[std::size_t(pair.b)];
+        if (a != b) mixed.push_back(a ? BroadPair{pair.b, pair.a} : pair);
+    }
+    std::sort(mixed.begin(), mixed.end(), [](const BroadPair& s, const BroadPair& t) { return key_of(s.a, s.b) < key_of(t.a, t.b); });
+    std::size_t k = 0;
+    for (const BroadPair& pair : mixed) {
+        const std::size_t i = std::size_t(pair.a), j = std::size_t(pair.b);
+        const Shape& shape = *world.shapes[std::size_t(world.shape[j])];
+        const Vec3 local = world.q[j].conjugate() * world.periodic(world.x[i] - world.x[j]);
+        const double scale = world.scale[j], within = world.radius[i] + skin;
+        if (scale * shape.distance_grid().sample(local / scale) >= within) continue;
+        if (scale * shape.exterior_reach() < world.radius[i])
+            throw Error(world.name(i) + " at " + world.name(j),
+                        "radius " + to_text(world.radius[i]) + " m is larger than the exterior distances of " + shape.name() + " reach (" +
+                            to_text(scale * shape.exterior_reach()) + " m)",
+                        "extend the shape's distances at least to the radius of the largest sphere");
+        l.sphere.push_back(pair.a);
+        l.grid.push_back(pair.b);
+        const std::uint64_t key = key_of(pair.a, pair.b);
+        while (k < old.sphere.size() && key_of(old.sphere[k], old.grid[k]) < key) ++k;
+        const bool same = k < old.sphere.size() && key_of(old.sphere[k], old.grid[k]) == key;
+        l.touch.push_back(same ? old.touch[k] : std::uint8_t{0});
+        l.slots.push_back(same ? old.slots[k] : Slots{});
+    }
+    l.out.resize(l.sphere.size());
+}
+
+/// Nodes of `slave` within the skin of `master`, tested cluster by cluster.
+template <class Distance>
+void append_nodes(const World::Impl& world, Index slave, double skin, const Distance& distance, std::vector<Index>& found)
+{
+    const std::size_t a = std::size_t(slave);
+    const Shape& shape = *world.shapes[std::size_t(world.shape[a])];
+    const double scale = world.scale[a];
+    for (const Shape::Cluster& cluster : shape.clusters()) {
+        if (distance(world.q[a] * (scale * cluster.centre)) > 1.05 * scale * cluster.radius + skin) continue;
+        for (int n = cluster.begin; n < cluster.end; ++n)
+            if (distance(world.q[a] * (scale * shape.nodes()[std::size_t(n)])) < skin) found.push_back(n);
+    }
+}
+
+void append_pair(const World::Impl& world, const NodeList& old, NodeList& l, Index slave, Index master, double skin, double share)
+{
+    const std::size_t a = std::size_t(slave);
+    const std::size_t begin = l.node.size();
+    if (master >= 0) {
+        const std::size_t b = std::size_t(master);
+        const Vec3 to_b = world.periodic(world.x[a] - world.x[b]);
+        const Quat inverse = world.q[b].conjugate();
+        const double scale = world.scale[b];
+        const sdf::DistanceGrid& field = world.shapes[std::size_t(world.shape[b])]->distance_grid();
+        append_nodes(world, slave, skin, [&](const Vec3& arm) { return scale * field.sample(inverse * (to_b + arm) / scale); }, l.node);
+    } else {
+        const WallData& wall = world.walls[std::size_t(-1 - master)];
+        if (wall.kind == WallData::Kind::plane) {
+            const double height = wall.normal.dot(world.x[a] - wall.point);
+            if (height > world.radius[a] + skin) return;
+            append_nodes(world, slave, skin, [&](const Vec3& arm) { return height + wall.normal.dot(arm); }, l.node);
+        } else {
+            Vec3 gradient;
+            if (wall.plate.distance_and_gradient(world.x[a], gradient) > world.radius[a] + skin) return;
+            append_nodes(world, slave, skin, [&](const Vec3& arm) { return wall.plate.distance_and_gradient(world.x[a] + arm, gradient); }, l.node);
+        }
+    }
+    if (l.node.size() == begin) return;
+    l.slave.push_back(slave);
+    l.master.push_back(master);
+    l.share.push_back(share);
+    l.start.push_back(Index(l.node.size()));
+    l.spring.resize(l.node.size(), Vec3::Zero());
+    l.touch.resize(l.node.size(), 0);
+    // Springs of the same pair, if it was listed before: pairs and nodes are both in order.
+    std::size_t low = 0, high = old.slave.size();
+    const std::uint64_t key = key_of(slave, master);
+    while (low < high) {
+        const std::size_t middle = (low + high) / 2;
+        if (key_of(old.slave[middle], old.master[middle]) < key) low = middle + 1;
+        else high = middle;
+    }
+    if (low == old.slave.size() || key_of(old.slave[low], old.master[low]) != key) return;
+    Index k = old.start[low];
+    for (std::size_t m = begin; m < l.node.size(); ++m) {
+        while (k < old.start[low + 1] && old.node[std::size_t(k)] < l.node[m]) ++k;
+        if (k == old.start[low + 1]) break;
+        if (old.node[std::size_t(k)] != l.node[m]) continue;
+        l.spring[m] = old.spring[std::size_t(k)];
+        l.touch[m] = old.touch[std::size_t(k)];
+    }
+}
+
+void make_node_list(World::Impl& world, const std::vector<BroadPair>& pairs, double skin)
+{
+    struct Directed {
+        Index slave, master;
+        double share;
+    };
+    std::vector<Directed> directed;
+    for (const BroadPair& pair : pairs) {
+        const std::size_t a = std::size_t(pair.a), b = std::size_t(pair.b);
+        if (!world.is_grid[a] || !world.is_grid[b]) continue;
+        // Nodes of the body of smaller outer volume; ties go to the lower id.
+        const bool first = world.equivalent[a] <= world.equivalent[b];
+        const double share = world.options.two_way_nodes ? 0.5 : 1.0;
+        if (first || world.options.two_way_nodes) directed.push_back({pair.a, pair.b, share});
+        if (!first || world.options.two_way_nodes) directed.push_back({pair.b, pair.a, share});
+    }
+    for (std::size_t i = 0; i < world.x.size(); ++i)
+        if (world.is_grid[i] && world.free(i))
+            for (std::size_t wall = 0; wall < world.walls.size(); ++wall) directed.push_back({Index(i), -1 - Index(wall), 1.0});
+    std::sort(directed.begin(), directed.end(),
+              [](const Directed& s, const Directed& t) { return key_of(s.slave, s.master) < key_of(t.slave, t.master); });
+    NodeList old = std::move(world.nodes);
+    NodeList& l = world.nodes;
+    l = {};
+    l.start.push_back(0);
+    for (const Directed& d : directed) append_pair(world, old, l, d.slave, d.master, skin, d.share);
+    l.gradient.resize(l.node.size());
+    l.force.resize(l.node.size());
+    l.depth.resize(l.node.size());
+    l.out.resize(l.slave.size());
+}
+
+}  // namespace
+
+void World::Impl::make_lists()
+{
+    const auto start = std::chrono::steady_clock::now();
+    skin = options.skin;
+    if (skin <= 0.0) {
+        std::vector<double> sizes;
+        for (std::size_t i = 0; i < x.size(); ++i)
+            if (in[i]) sizes.push_back(equivalent[i]);
+        if (!sizes.empty()) {
+            std::nth_element(sizes.begin(), sizes.begin() + std::ptrdiff_t(sizes.size() / 2), sizes.end());
+            skin = 0.25 * sizes[sizes.size() / 2];
+        }
+    }
+    const std::vector<BroadPair> pairs = broad_phase(*this, skin);
+    make_sphere_list(*this, pairs);
+    make_sphere_wall_list(*this, skin);
+    make_sphere_grid_list(*this, pairs, skin);
+    make_node_list(*this, pairs, skin);
+    const auto blocks = [](std::size_t n, std::size_t grain) { return (n + grain - 1) / grain; };
+    out_count[0].assign(blocks(spheres.rows.size(), row_grain), 0);
+    out_count[1].assign(blocks(sphere_walls.body.size(), entry_grain), 0);
+    out_count[2].assign(blocks(sphere_grids.sphere.size(), grid_grain), 0);
+    const std::size_t points = out_count[0].size() + out_count[1].size() + out_count[2].size();
+    crossings.resize(std::max(crossings.size(), points));
+    block_sums.assign(points + blocks(nodes.slave.size(), node_grain), LoopSums{});
+    x_reference = x;
+    q_reference = q;
+    for (WallData& wall : walls) wall.reference = wall.point;
+    lists_valid = true;
+    ++counters.rebuilds;
+    counters.seconds_lists += seconds_since(start);
+}
+
+bool World::Impl::lists_expired() const
+{
+    const double limit = free_path * skin;
+    for (const WallData& wall : walls)
+        if ((wall.point - wall.reference).squaredNorm() > limit * limit) return true;
+    for (std::size_t i = 0; i < x.size(); ++i) {
+        const double moved2 = (x[i] - x_reference[i]).squaredNorm();
+        if (moved2 > limit * limit) return true;
+        if (!is_grid[i]) continue;
+        // |q - q'| is half the angle for small turns; either sign of q is the same turn.
+        const double turn = 2.0 * std::min((q[i].coeffs() - q_reference[i].coeffs()).norm(), (q[i].coeffs() + q_reference[i].coeffs()).norm());
+        if (std::sqrt(moved2) + turn * radius[i] > limit) return true;
+    }
+    return false;
+}
+
+}  // namespace coral::dem

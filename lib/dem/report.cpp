@@ -1,0 +1,207 @@
+// What a world reports: contacts, energies, statistics, friction springs; and its complete state as bytes.
+#include <algorithm>
+#include <cstring>
+
+#include "core/error.h"
+#include "dem/detail/impl.h"
+
+namespace coral::dem {
+
+namespace {
+
+Contact report(const World::Impl& m, const PointForce& c)
+{
+    return {c.a, c.b, m.x[std::size_t(c.a)] - c.arm_a * c.normal, c.normal, c.force * c.normal, c.tangential, c.overlap, 1};
+}
+
+Contact report(const World::Impl& m, const GeneralForce& c)
+{
+    const double size = c.normal_force.norm();
+    const Vec3 normal = size > 0.0 ? Vec3(c.normal_force / size) : (c.arm.norm() > 0.0 ? Vec3(-c.arm.normalized()) : Vec3::UnitZ());
+    return {c.a, c.b, m.x[std::size_t(c.a)] + c.arm, normal, c.normal_force, c.tangential_force, c.overlap, c.points};
+}
+
+bool in_order(int first_a, int second_a, int first_b, int second_b) { return first_a != first_b ? first_a < first_b : second_a < second_b; }
+
+template <class Visit>
+void for_each_contact(const World::Impl& m, const Visit& visit)
+{
+    for (std::size_t block = 0; block < m.out_count[0].size(); ++block)
+        for (std::int32_t k = 0; k < m.out_count[0][block]; ++k) visit(m.spheres.out[std::size_t(m.spheres.row[block * row_grain] + k)]);
+    for (std::size_t block = 0; block < m.out_count[1].size(); ++block)
+        for (std::int32_t k = 0; k < m.out_count[1][block]; ++k) visit(m.sphere_walls.out[block * entry_grain + std::size_t(k)]);
+    for (std::size_t block = 0; block < m.out_count[2].size(); ++block)
+        for (std::int32_t k = 0; k < m.out_count[2][block]; ++k) visit(m.sphere_grids.out[block * grid_grain + std::size_t(k)]);
+    for (const GeneralForce& c : m.nodes.out)
+        if (c.points > 0) visit(c);
+}
+
+}  // namespace
+
+std::vector<Contact> World::contacts() const
+{
+    impl_->refresh_forces();
+    std::vector<Contact> list;
+    for_each_contact(*impl_, [&](const auto& c) { list.push_back(report(*impl_, c)); });
+    std::stable_sort(list.begin(), list.end(), [](const Contact& a, const Contact& b) { return in_order(a.first, a.second, b.first, b.second); });
+    return list;
+}
+
+Energy World::energy() const
+{
+    Impl& m = *impl_;
+    m.refresh_forces();
+    Energy e;
+    e.kinetic = m.kinetic_energy();
+    e.elastic_normal = m.sums.elastic_normal;
+    e.elastic_tangential = m.sums.elastic_tangential;
+    if (!m.ledger_started) {
+        e.initial = e.stored();
+        return e;
+    }
+    e.initial = m.initial;
+    e.gravity_work = m.gravity_work;
+    e.external_work = m.external_work;
+    e.wall_work = m.wall_work;
+    e.friction = m.dissipated_friction;
+    e.damping = m.dissipated_damping;
+    e.closure = e.stored() - (e.initial + e.gravity_work + e.external_work + e.wall_work - e.friction - e.damping);
+    return e;
+}
+
+void World::reset_energy() { impl_->ledger_started = false; }
+
+Statistics World::statistics() const
+{
+    Impl& m = *impl_;
+    m.refresh_forces();
+    Statistics s;
+    s.kinetic_energy = m.kinetic_energy();
+    s.max_overlap = m.sums.max_overlap;
+    s.deep_contacts = m.sums.deep;
+    double normal_sum = 0.0, net_sum = 0.0;
+    std::int64_t pairs = 0, touching_bodies = 0;
+    std::vector<std::uint8_t> touched(m.x.size(), 0);
+    const auto note = [&](Index a, Index b, double size) {
+        ++s.contacts;
+        normal_sum += size;
+        touched[std::size_t(a)] = 1;
+        if (b >= 0) {
+            ++pairs;
+            touched[std::size_t(b)] = 1;
+        }
+    };
+    for_each_contact(m, [&](const auto& c) {
+        if constexpr (std::is_same_v<std::decay_t<decltype(c)>, PointForce>) note(c.a, c.b, c.force);
+        else note(c.a, c.b, c.normal_force.norm());
+    });
+    for (std::size_t i = 0; i < m.x.size(); ++i) {
+        if (!m.free(i)) continue;
+        s.max_speed = std::max(s.max_speed, m.v[i].norm());
+        if (!touched[i]) continue;
+        net_sum += (m.force[i] + m.external_force[i] + m.mass[i] * m.options.gravity).norm();
+        ++touching_bodies;
+    }
+    if (m.active > 0) s.coordination = 2.0 * double(pairs) / m.active;
+    if (touching_bodies > 0 && normal_sum > 0.0) s.unbalanced_ratio = (net_sum / double(touching_bodies)) / (normal_sum / double(s.contacts));
+    return s;
+}
+
+// ---- Friction springs ----
+
+std::vector<ContactSpring> World::contact_springs() const
+{
+    const Impl& m = *impl_;
+    std::vector<ContactSpring> list;
+    for (std::size_t r = 0; r < m.spheres.rows.size(); ++r)
+        for (Index k = m.spheres.row[r]; k < m.spheres.row[r + 1]; ++k)
+            if (m.spheres.touch[std::size_t(k)])
+                list.push_back({m.spheres.rows[r], m.spheres.other[std::size_t(k)], 0, m.spheres.spring[std::size_t(k)], Vec3::Zero()});
+    const SphereWallList& w = m.sphere_walls;
+    for (std::size_t k = 0; k < w.body.size(); ++k)
+        if (w.touch[k]) list.push_back({w.body[k], -1 - w.wall[k], w.feature[k], w.spring[k], Vec3::Zero()});
+    const SphereGridList& g = m.sphere_grids;
+    for (std::size_t k = 0; k < g.sphere.size(); ++k)
+        for (int slot = 0; slot < Slots::count; ++slot)
+            if (g.touch[k] && (g.slots[k].used >> slot & 1))
+                list.push_back({g.sphere[k], g.grid[k], slot, g.slots[k].spring[slot], g.slots[k].normal[slot]});
+    const NodeList& n = m.nodes;
+    for (std::size_t p = 0; p < n.slave.size(); ++p)
+        for (Index k = n.start[p]; k < n.start[p + 1]; ++k)
+            if (n.touch[std::size_t(k)]) list.push_back({n.slave[p], n.master[p], n.node[std::size_t(k)], n.spring[std::size_t(k)], Vec3::Zero()});
+    std::stable_sort(list.begin(), list.end(), [](const ContactSpring& a, const ContactSpring& b) {
+        return a.first == b.first && a.second == b.second ? a.node < b.node : in_order(a.first, a.second, b.first, b.second);
+    });
+    return list;
+}
+
+void World::set_contact_springs(std::span<const ContactSpring> springs)
+{
+    Impl& m = *impl_;
+    if (!m.lists_valid) m.make_lists();
+    for (const ContactSpring& s : springs) {
+        const auto row = std::lower_bound(m.spheres.rows.begin(), m.spheres.rows.end(), s.first);
+        if (row != m.spheres.rows.end() && *row == s.first && s.second >= 0) {
+            const std::size_t r = std::size_t(row - m.spheres.rows.begin());
+            const auto begin = m.spheres.other.begin() + m.spheres.row[r], end = m.spheres.other.begin() + m.spheres.row[r + 1];
+            const auto found = std::lower_bound(begin, end, s.second);
+            if (found != end && *found == s.second) {
+                const std::size_t k = std::size_t(found - m.spheres.other.begin());
+                m.spheres.spring[k] = s.spring;
+                m.spheres.touch[k] = 1;
+                continue;
+            }
+        }
+        for (std::size_t k = 0; s.second < 0 && k < m.sphere_walls.body.size(); ++k)
+            if (m.sphere_walls.body[k] == s.first && m.sphere_walls.wall[k] == -1 - s.second && m.sphere_walls.feature[k] == s.node) {
+                m.sphere_walls.spring[k] = s.spring;
+                m.sphere_walls.touch[k] = 1;
+            }
+        for (std::size_t k = 0; s.second >= 0 && k < m.sphere_grids.sphere.size(); ++k)
+            if (m.sphere_grids.sphere[k] == s.first && m.sphere_grids.grid[k] == s.second && s.node >= 0 && s.node < Slots::count) {
+                Slots& slots = m.sphere_grids.slots[k];
+                slots.used = std::uint8_t(slots.used | 1 << s.node);
+                slots.spring[s.node] = s.spring;
+                slots.normal[s.node] = s.normal;
+                m.sphere_grids.touch[k] = 1;
+            }
+        for (std::size_t p = 0; p < m.nodes.slave.size(); ++p) {
+            if (m.nodes.slave[p] != s.first || m.nodes.master[p] != s.second) continue;
+            const auto begin = m.nodes.node.begin() + m.nodes.start[p], end = m.nodes.node.begin() + m.nodes.start[p + 1];
+            const auto found = std::lower_bound(begin, end, s.node);
+            if (found == end || *found != s.node) continue;
+            const std::size_t k = std::size_t(found - m.nodes.node.begin());
+            m.nodes.spring[k] = s.spring;
+            m.nodes.touch[k] = 1;
+        }
+    }
+    m.forces_valid = false;
+}
+
+void World::Impl::drop_contacts(Index body)
+{
+    for (std::size_t r = 0; r < spheres.rows.size(); ++r)
+        for (Index k = spheres.row[r]; k < spheres.row[r + 1]; ++k)
+            if (spheres.rows[r] == body || spheres.other[std::size_t(k)] == body) {
+                spheres.spring[std::size_t(k)].setZero();
+                spheres.touch[std::size_t(k)] = 0;
+            }
+    for (std::size_t k = 0; k < sphere_walls.body.size(); ++k)
+        if (sphere_walls.body[k] == body) {
+            sphere_walls.spring[k].setZero();
+            sphere_walls.touch[k] = 0;
+        }
+    for (std::size_t k = 0; k < sphere_grids.sphere.size(); ++k)
+        if (sphere_grids.sphere[k] == body || sphere_grids.grid[k] == body) {
+            sphere_grids.slots[k] = {};
+            sphere_grids.touch[k] = 0;
+        }
+    for (std::size_t p = 0; p < nodes.slave.size(); ++p)
+        if (nodes.slave[p] == body || nodes.master[p] == body)
+            for (Index k = nodes.start[p]; k < nodes.start[p + 1]; ++k) {
+                nodes.spring[std::size_t(k)].setZero();
+                nodes.touch[std::size_t(k)] = 0;
+            }
+}
+
+}  // namespace coral::dem

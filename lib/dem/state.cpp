@@ -1,0 +1,117 @@
+// Complete state of a world as bytes, for a restart that goes on bit for bit.
+#include <cstring>
+
+#include "core/error.h"
+#include "dem/detail/impl.h"
+
+namespace coral::dem {
+
+namespace {
+
+constexpr std::uint64_t magic = 0x3130'4d45'4452'4f43;  // "CORDEM01"
+
+std::uint64_t checksum(std::span<const std::uint8_t> bytes)
+{
+    std::uint64_t h = 1469598103934665603ull;
+    for (const std::uint8_t b : bytes) h = (h ^ b) * 1099511628211ull;
+    return h;
+}
+
+/// Writes, or reads back, one field after the other; both run through visit_state, so they cannot differ.
+struct Writer {
+    std::vector<std::uint8_t> bytes;
+    void raw(const void* data, std::size_t size)
+    {
+        const auto* p = static_cast<const std::uint8_t*>(data);
+        bytes.insert(bytes.end(), p, p + size);
+    }
+    template <class T>
+    void operator()(T& value)
+    {
+        raw(&value, sizeof(T));
+    }
+    template <class T>
+    void operator()(std::vector<T>& values)
+    {
+        std::uint64_t n = values.size();
+        raw(&n, sizeof n);
+        raw(values.data(), n * sizeof(T));
+    }
+};
+
+struct Reader {
+    std::span<const std::uint8_t> bytes;
+    std::size_t at = 0;
+    void raw(void* data, std::size_t size)
+    {
+        if (size > bytes.size() - at) throw Error("checkpoint", "the state of the bodies ends too early", "use an older checkpoint");
+        if (size > 0) std::memcpy(data, bytes.data() + at, size);
+        at += size;
+    }
+    template <class T>
+    void operator()(T& value)
+    {
+        raw(static_cast<void*>(&value), sizeof(T));
+    }
+    template <class T>
+    void operator()(std::vector<T>& values)
+    {
+        std::uint64_t n = 0;
+        raw(&n, sizeof n);
+        if (n > (bytes.size() - at) / sizeof(T)) throw Error("checkpoint", "the state of the bodies ends too early", "use an older checkpoint");
+        values.resize(n);
+        raw(static_cast<void*>(values.data()), n * sizeof(T));
+    }
+};
+
+template <class Archive>
+void visit_state(World::Impl& m, Archive& io)
+{
+    io(m.x), io(m.v), io(m.w), io(m.momentum), io(m.q), io(m.force), io(m.torque), io(m.external_force), io(m.external_torque);
+    io(m.scale), io(m.density), io(m.shape), io(m.material), io(m.motion), io(m.in);
+    for (WallData& wall : m.walls) io(wall.point), io(wall.velocity), io(wall.force), io(wall.reference);
+    io(m.options.gravity), io(m.active), io(m.lists_valid), io(m.forces_valid), io(m.skin), io(m.x_reference), io(m.q_reference);
+    SphereList& s = m.spheres;
+    io(s.row), io(s.other), io(s.spring), io(s.touch), io(s.out), io(s.rows);
+    SphereWallList& w = m.sphere_walls;
+    io(w.body), io(w.wall), io(w.feature), io(w.touch), io(w.spring), io(w.out);
+    SphereGridList& g = m.sphere_grids;
+    io(g.sphere), io(g.grid), io(g.touch), io(g.slots), io(g.out);
+    NodeList& n = m.nodes;
+    io(n.slave), io(n.master), io(n.start), io(n.node), io(n.spring), io(n.touch), io(n.gradient), io(n.force), io(n.depth), io(n.share), io(n.out);
+    io(m.out_count[0]), io(m.out_count[1]), io(m.out_count[2]), io(m.block_sums), io(m.sums), io(m.time);
+    io(m.dissipated_friction), io(m.dissipated_damping), io(m.gravity_work), io(m.external_work), io(m.wall_work), io(m.initial), io(m.ledger_started);
+    io(m.counters);
+}
+
+}  // namespace
+
+std::vector<std::uint8_t> World::save() const
+{
+    Writer body;
+    visit_state(*impl_, body);
+    Writer all;
+    std::uint64_t head[4] = {magic, checksum(body.bytes), impl_->x.size(), impl_->walls.size()};
+    all(head);
+    all.raw(body.bytes.data(), body.bytes.size());
+    return std::move(all.bytes);
+}
+
+void World::restore(std::span<const std::uint8_t> state)
+{
+    Impl& m = *impl_;
+    Reader in{state};
+    std::uint64_t head[4] = {};
+    in(head);
+    const std::span<const std::uint8_t> rest = state.subspan(in.at);
+    if (head[0] != magic || checksum(rest) != head[1]) throw Error("checkpoint", "the state of the bodies is damaged", "use an older checkpoint");
+    if (head[2] != m.x.size() || head[3] != m.walls.size())
+        throw Error("checkpoint", "it holds " + std::to_string(head[2]) + " bodies and " + std::to_string(head[3]) + " walls, the case has " +
+                                      std::to_string(m.x.size()) + " and " + std::to_string(m.walls.size()),
+                    "resume with the case that wrote it");
+    visit_state(m, in);
+    for (std::size_t i = 0; i < m.x.size(); ++i) m.update_mass(i);
+    m.crossings.resize(std::max(m.crossings.size(), m.out_count[0].size() + m.out_count[1].size() + m.out_count[2].size()));
+}
+
+}  // namespace coral::dem
