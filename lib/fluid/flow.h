@@ -99,6 +99,9 @@ struct FlowState {
 };
 
 class Poisson;
+namespace detail {
+struct FaceRange;
+}
 
 class Flow {
 public:
@@ -188,10 +191,15 @@ private:
     void build_volume_flux();
     void solve_increment(double dt);
     void correct(double dt);
+    double correct_row(int axis, const detail::FaceRange& range, int j, int k, double factor);
     void diagnose();
+    void balance_sides();
     void fill_velocity_ghosts();
+    void fill_centre_ghosts(Field& f) const;
     void fill_pressure_ghosts();
-    void check_finite(double speed) const;
+    void apply_given_velocities(std::array<Field, 3>& velocity) const;
+    void find_fluid_mass();
+    Eigen::Vector3d total_momentum() const;
     Eigen::Vector3d boundary_pressure_force() const;
 
     GridSpec grid_;
@@ -202,15 +210,18 @@ private:
     std::array<Field, 3> volume_flux_;                    // eps u on faces; empty without fines
     Field pressure_;
     Field work_;     // right-hand side and solution of the Poisson equation
+    Field turned_;   // the same with another axis slowest, where the solver needs it
     Field scratch_;  // rolling fluxes of the predictor, one part per block of planes
     PorousFields porous_;
     bool has_fines_ = false;
     MomentumTally momentum_;
     MassTally mass_;
     FlowTimes times_;
-    Eigen::Vector3d flux_rate_ = Eigen::Vector3d::Zero();             // boundary fluxes of the last predict [N]
-    Eigen::Vector3d advective_rate_ = Eigen::Vector3d::Zero();        // rho sum u div q of the last predict [N]
-    Eigen::Vector3d pending_defect_ = Eigen::Vector3d::Zero();        // momentum moved by change_void_fraction [N s]
+    Eigen::Vector3d fluid_mass_ = Eigen::Vector3d::Zero();      // of the unknown faces, per component [kg]
+    Eigen::Vector3d flux_rate_ = Eigen::Vector3d::Zero();       // boundary fluxes of the last predict [N]
+    Eigen::Vector3d advective_sum_ = Eigen::Vector3d::Zero();   // rho sum u div q of the last predict [N]
+    Eigen::Vector3d advective_rate_ = Eigen::Vector3d::Zero();  // the same as the step combines it with the one before [N]
+    Eigen::Vector3d pending_defect_ = Eigen::Vector3d::Zero();  // momentum moved by change_void_fraction [N s]
     double previous_dt_ = 0.0;                                        // 0: no history
     double step_limit_ = std::numeric_limits<double>::infinity();
     double max_speed_ = 0.0;  // max sum_i |u_i| [m/s]

@@ -1,0 +1,368 @@
+#include "fluid/flow.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "core/error.h"
+#include "core/parallel.h"
+#include "fluid/detail/faces.h"
+#include "fluid/detail/lanes.h"
+#include "fluid/poisson.h"
+
+namespace coral::fluid {
+
+using detail::FaceRange;
+using detail::planes_per_block;
+
+namespace {
+
+const auto add_lanes = [](std::ptrdiff_t n, const auto& value) { return detail::lane_sum(n, value); };
+
+double seconds_since(std::chrono::steady_clock::time_point start)
+{
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+}  // namespace
+
+double MomentumTally::relative_error() const
+{
+    const Eigen::Vector3d defect =
+        after - before - (boundary_flux + boundary_pressure + body + drag + forcing - fines_pressure);
+    const double size = boundary_flux.norm() + boundary_pressure.norm() + body.norm() + drag.norm() + forcing.norm() +
+                        fines_pressure.norm() + (after - before).norm();
+    return size > 0.0 ? defect.norm() / size : 0.0;
+}
+
+double MassTally::relative_error() const
+{
+    const double divergence = velocity_scale > 0.0 ? max_divergence * cell / velocity_scale : 0.0;
+    return std::max(divergence, inflow > 0.0 ? std::abs(net_flux) / inflow : 0.0);
+}
+
+double fit_time_step(double stable, double remaining)
+{
+    return remaining <= stable ? remaining : remaining / std::ceil(remaining / stable);
+}
+
+Flow::Flow(const GridSpec& grid, const FlowOptions& options) : grid_(grid), layout_(grid.cells), options_(options)
+{
+    grid.validate();
+    if (!(options.density > 0.0)) throw UsageError("fluid.density", "is not positive", "water has 1000 kg/m3");
+    if (!(options.kinematic_viscosity > 0.0))
+        throw UsageError("fluid.kinematic_viscosity", "is not positive", "water has 1e-6 m2/s");
+    if (!(options.cfl > 0.0 && options.cfl <= 0.8)) throw UsageError("time.cfl", "is outside (0, 0.8]", "0.5 is a good choice");
+    poisson_ = std::make_shared<const Poisson>(grid);
+    for (int axis = 0; axis < 3; ++axis) {
+        velocity_[axis] = layout_.make_field();
+        provisional_[axis] = layout_.make_field();
+        rate_[axis] = layout_.make_field();
+    }
+    pressure_ = layout_.make_field();
+    work_ = poisson_->make_work();
+    const std::size_t blocks = (std::size_t(grid.cells.z()) + 1 + planes_per_block - 1) / planes_per_block;
+    scratch_ = Field(blocks * std::size_t(layout_.stride[2] + 2 * layout_.stride[1]), 0.0);
+    restart_history();
+}
+
+void Flow::restart_history()
+{
+    fill_velocity_ghosts();
+    fill_pressure_ghosts();
+    for (Field& rate : rate_) std::fill(rate.begin(), rate.end(), 0.0);
+    flux_rate_.setZero();
+    advective_sum_.setZero();
+    pending_defect_.setZero();
+    previous_dt_ = 0.0;
+    find_fluid_mass();
+    diagnose();
+    momentum_ = MomentumTally{};
+    momentum_.after = total_momentum();
+    step_limit_ = std::numeric_limits<double>::infinity();
+    step_limit_ = options_.first_step_factor * stable_time_step();
+}
+
+double Flow::stable_time_step() const
+{
+    const double h = grid_.cell;
+    const double limit = 1.5 * options_.cfl / (12.0 * options_.kinematic_viscosity / (h * h) + 1.5 * max_speed_ / h);
+    return std::min({limit, options_.max_time_step, step_limit_});
+}
+
+PorousFields& Flow::porous_fields_for_writing()
+{
+    if (porous_.void_fraction.empty()) {
+        porous_.void_fraction = layout_.make_field(1.0);
+        for (int axis = 0; axis < 3; ++axis) {
+            porous_.solid_flux[axis] = layout_.make_field();
+            porous_.drag_rate[axis] = layout_.make_field();
+            porous_.drag_force[axis] = layout_.make_field();
+        }
+    }
+    return porous_;
+}
+
+void Flow::change_void_fraction(Field& void_fraction)
+{
+    porous_fields_for_writing();
+    fill_centre_ghosts(void_fraction);
+    porous_.void_fraction = void_fraction;
+    const bool initial = !has_fines_ && previous_dt_ == 0.0;
+    has_fines_ = true;
+    find_fluid_mass();
+    const Eigen::Vector3d momentum = total_momentum();
+    if (initial) momentum_.after = momentum;
+    pending_defect_ = momentum - momentum_.after;
+}
+
+/// Mass of fluid that the equations of each component move: half volumes at outlets, none at given velocities.
+void Flow::find_fluid_mass()
+{
+    for (int axis = 0; axis < 3; ++axis) {
+        const FaceRange range(grid_, axis);
+        fluid_mass_[axis] = parallel_sum(range.planes(), planes_per_block, 0.0, [&](std::size_t begin, std::size_t end) {
+            double sum = 0.0;
+            for (int k = range.low.z() + int(begin); k < range.low.z() + int(end); ++k)
+                for (int j = range.low.y(); j < range.high.y(); ++j) {
+                    const std::size_t f0 = layout_.index(range.low.x(), j, k);
+                    sum += detail::weighted_row(grid_, axis, range, j, k, add_lanes,
+                                                [&](std::ptrdiff_t i) { return face_void_fraction(axis, f0 + std::size_t(i)); });
+                }
+            return sum;
+        });
+    }
+    fluid_mass_ *= options_.density * grid_.cell_volume();
+}
+
+Eigen::Vector3d Flow::total_momentum() const
+{
+    Eigen::Vector3d total;
+    for (int axis = 0; axis < 3; ++axis) {
+        const FaceRange range(grid_, axis);
+        const double* u = velocity_[axis].data();
+        total[axis] = parallel_sum(range.planes(), planes_per_block, 0.0, [&](std::size_t begin, std::size_t end) {
+            double sum = 0.0;
+            for (int k = range.low.z() + int(begin); k < range.low.z() + int(end); ++k)
+                for (int j = range.low.y(); j < range.high.y(); ++j) {
+                    const std::size_t f0 = layout_.index(range.low.x(), j, k);
+                    sum += detail::weighted_row(grid_, axis, range, j, k, add_lanes, [&](std::ptrdiff_t i) {
+                        return face_void_fraction(axis, f0 + std::size_t(i)) * u[f0 + std::size_t(i)];
+                    });
+                }
+            return sum;
+        });
+    }
+    return options_.density * grid_.cell_volume() * total;
+}
+
+/// Right-hand side div(eps u* + J_s)/dt into work_, then its solution.
+void Flow::solve_increment(double dt)
+{
+    const double scale = 1.0 / (grid_.cell * dt);
+    const std::ptrdiff_t s[3] = {1, layout_.stride[1], layout_.stride[2]};
+    const double* us[3] = {provisional_[0].data(), provisional_[1].data(), provisional_[2].data()};
+    const double* eps = porous_.void_fraction.data();
+    parallel_blocks(std::size_t(grid_.cells.z()), planes_per_block, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t k = begin; k < end; ++k)
+            for (int j = 0; j < grid_.cells.y(); ++j) {
+                const auto c0 = std::ptrdiff_t(layout_.index(0, j, int(k)));
+                double* __restrict b = work_.data() + k * poisson_->plane() + std::size_t(j) * poisson_->row();
+                const std::ptrdiff_t n = grid_.cells.x();
+                if (!has_fines_) {
+                    for (std::ptrdiff_t i = 0; i < n; ++i) {
+                        const std::ptrdiff_t c = c0 + i;
+                        b[i] = scale * ((us[0][c + 1] - us[0][c]) + (us[1][c + s[1]] - us[1][c]) + (us[2][c + s[2]] - us[2][c]));
+                    }
+                    continue;
+                }
+                for (std::ptrdiff_t i = 0; i < n; ++i) {
+                    const std::ptrdiff_t c = c0 + i;
+                    double sum = 0.0;
+                    for (int d = 0; d < 3; ++d) {
+                        const double* J = porous_.solid_flux[d].data();
+                        const double high = 0.5 * (eps[c] + eps[c + s[d]]) * us[d][c + s[d]] + J[c + s[d]];
+                        const double low = 0.5 * (eps[c] + eps[c - s[d]]) * us[d][c] + J[c];
+                        sum += high - low;
+                    }
+                    b[i] = scale * sum;
+                }
+            }
+    });
+    poisson_->solve(work_, turned_);
+}
+
+/// Rows of component `axis` at plane k: u = u* - dt grad(pi)/eps. \returns the weighted sum of eps u
+double Flow::correct_row(int axis, const FaceRange& range, int j, int k, double factor)
+{
+    const double* pi = work_.data();
+    const auto f0 = std::ptrdiff_t(layout_.index(range.low.x(), j, k));
+    const std::ptrdiff_t own = layout_.stride[axis];
+    const double* us = provisional_[axis].data() + f0;
+    double* __restrict u = velocity_[axis].data() + f0;
+    const double* eps = has_fines_ ? porous_.void_fraction.data() + f0 : nullptr;
+    const auto face_eps = [&](std::ptrdiff_t i) { return eps ? 0.5 * (eps[i] + eps[i - own]) : 1.0; };
+    const auto row_of = [&](int jj, int kk) { return pi + std::size_t(kk) * poisson_->plane() + std::size_t(jj) * poisson_->row(); };
+    const int n = grid_.cells[axis];
+    if (axis == 0) {
+        const double* row = row_of(j, k);
+        const int low = range.low.x();
+        for (int i = std::max(low, 1); i < std::min(range.high.x(), n); ++i)
+            u[i - low] = us[i - low] - factor * (row[i] - row[i - 1]) / (eps ? face_eps(i - low) : 1.0);
+        if (low == 0) {
+            const double before = grid_.periodic(0) ? row[n - 1] : -row[0];
+            u[0] = us[0] - factor * (row[0] - before) / face_eps(0);
+        }
+        if (range.high.x() > n) u[n - low] = us[n - low] + 2.0 * factor * row[n - 1] / face_eps(n - low);
+    } else {
+        const int position = axis == 1 ? j : k;
+        const auto row_at = [&](int at) { return axis == 1 ? row_of(at, k) : row_of(j, at); };
+        const double* high = row_at(std::min(position, n - 1));
+        const double* low = row_at(position > 0 ? position - 1 : (grid_.periodic(axis) ? n - 1 : 0));
+        // the increment is zero on an outlet face: the cell beyond it holds the negative
+        const double high_sign = position == n ? -1.0 : 1.0;
+        const double low_sign = position == 0 && !grid_.periodic(axis) ? -1.0 : 1.0;
+        const std::ptrdiff_t m = range.row_length();
+        if (eps)
+            for (std::ptrdiff_t i = 0; i < m; ++i) u[i] = us[i] - factor * (high_sign * high[i] - low_sign * low[i]) / face_eps(i);
+        else
+            for (std::ptrdiff_t i = 0; i < m; ++i) u[i] = us[i] - factor * (high_sign * high[i] - low_sign * low[i]);
+    }
+    if (eps)
+        return detail::weighted_row(grid_, axis, range, j, k, add_lanes, [&](std::ptrdiff_t i) { return face_eps(i) * u[i]; });
+    return detail::weighted_row(grid_, axis, range, j, k, add_lanes, [&](std::ptrdiff_t i) { return u[i]; });
+}
+
+void Flow::correct(double dt)
+{
+    const double factor = dt / grid_.cell;
+    const FaceRange ranges[3] = {FaceRange(grid_, 0), FaceRange(grid_, 1), FaceRange(grid_, 2)};
+    const auto planes = std::size_t(grid_.cells.z()) + 1;
+    const Eigen::Vector3d zero = Eigen::Vector3d::Zero();
+    const Eigen::Vector3d sum = parallel_sum(planes, planes_per_block, zero, [&](std::size_t begin, std::size_t end) {
+        Eigen::Vector3d part = Eigen::Vector3d::Zero();
+        for (int k = int(begin); k < int(end); ++k) {
+            for (int axis = 0; axis < 3; ++axis) {
+                if (k < ranges[axis].low.z() || k >= ranges[axis].high.z()) continue;
+                for (int j = ranges[axis].low.y(); j < ranges[axis].high.y(); ++j)
+                    part[axis] += correct_row(axis, ranges[axis], j, k, factor);
+            }
+            if (k == grid_.cells.z()) continue;
+            for (int j = 0; j < grid_.cells.y(); ++j) {
+                double* p = pressure_.data() + layout_.index(0, j, k);
+                const double* pi = work_.data() + std::size_t(k) * poisson_->plane() + std::size_t(j) * poisson_->row();
+                for (int i = 0; i < grid_.cells.x(); ++i) p[i] += pi[i];
+            }
+        }
+        return part;
+    });
+    momentum_.after = options_.density * grid_.cell_volume() * sum;
+}
+
+/// Largest divergence and largest sum_i |u_i| over the cells.
+void Flow::diagnose()
+{
+    const std::ptrdiff_t s[3] = {1, layout_.stride[1], layout_.stride[2]};
+    const double* u[3] = {velocity_[0].data(), velocity_[1].data(), velocity_[2].data()};
+    std::vector<Eigen::Vector2d> largest((std::size_t(grid_.cells.z()) + planes_per_block - 1) / planes_per_block, {0.0, 0.0});
+    parallel_blocks(std::size_t(grid_.cells.z()), planes_per_block, [&](std::size_t begin, std::size_t end) {
+        Eigen::Vector2d& block = largest[begin / planes_per_block];
+        for (int k = int(begin); k < int(end); ++k)
+            for (int j = 0; j < grid_.cells.y(); ++j) {
+                const auto c0 = std::ptrdiff_t(layout_.index(0, j, k));
+                const auto speed = [&](std::ptrdiff_t i) {
+                    double sum = 0.0;
+                    for (int d = 0; d < 3; ++d) {
+                        const double low = std::abs(u[d][c0 + i]), high = std::abs(u[d][c0 + i + s[d]]);
+                        sum += low > high ? low : high;
+                    }
+                    return sum;
+                };
+                const auto divergence = [&](std::ptrdiff_t i) {
+                    double sum = 0.0;
+                    for (int d = 0; d < 3; ++d) sum += u[d][c0 + i + s[d]] - u[d][c0 + i];
+                    return std::abs(sum);
+                };
+                const auto porous_divergence = [&](std::ptrdiff_t i) {
+                    double sum = 0.0;
+                    for (int d = 0; d < 3; ++d) {
+                        const auto c = std::size_t(c0 + i), next = c + std::size_t(s[d]);
+                        sum += face_void_fraction(d, next) * u[d][next] - face_void_fraction(d, c) * u[d][c] +
+                               porous_.solid_flux[d][next] - porous_.solid_flux[d][c];
+                    }
+                    return std::abs(sum);
+                };
+                const std::ptrdiff_t n = grid_.cells.x();
+                block[0] = std::max(block[0], detail::lane_max(n, speed));
+                block[1] = std::max(block[1], has_fines_ ? detail::lane_max(n, porous_divergence) : detail::lane_max(n, divergence));
+            }
+    });
+    mass_ = MassTally{};
+    mass_.cell = grid_.cell;
+    for (const Eigen::Vector2d& block : largest) {
+        mass_.velocity_scale = std::max(mass_.velocity_scale, block[0]);
+        mass_.max_divergence = std::max(mass_.max_divergence, block[1] / grid_.cell);
+    }
+    max_speed_ = mass_.velocity_scale;
+    balance_sides();
+}
+
+void Flow::project(double dt)
+{
+    const auto start = std::chrono::steady_clock::now();
+    apply_given_velocities(provisional_);
+    solve_increment(dt);
+    const auto solved = std::chrono::steady_clock::now();
+    correct(dt);
+    if (!momentum_.after.allFinite())
+        throw Error("flow", "the velocity is no longer finite after step " + std::to_string(times_.steps),
+                    "lower time.cfl or cap the time step");
+    fill_velocity_ghosts();
+    fill_pressure_ghosts();
+    momentum_.boundary_pressure = dt * boundary_pressure_force();
+    diagnose();
+    previous_dt_ = dt;
+    ++times_.steps;
+    times_.poisson += std::chrono::duration<double>(solved - start).count();
+    times_.correction += seconds_since(solved);
+}
+
+FlowState Flow::save() const
+{
+    FlowState state;
+    state.velocity = velocity_;
+    state.pressure = pressure_;
+    state.previous_rate = rate_;
+    if (has_fines_) state.void_fraction = porous_.void_fraction;
+    state.scalars = {previous_dt_, step_limit_, max_speed_, double(times_.steps)};
+    for (const Eigen::Vector3d& v : {flux_rate_, advective_sum_, pending_defect_, momentum_.after})
+        state.scalars.insert(state.scalars.end(), v.data(), v.data() + 3);
+    return state;
+}
+
+void Flow::restore(const FlowState& state)
+{
+    const auto fits = [&](const Field& f) { return f.size() == layout_.total; };
+    bool whole = fits(state.pressure) && state.scalars.size() == 16 && (state.void_fraction.empty() || fits(state.void_fraction));
+    for (int axis = 0; axis < 3; ++axis) whole = whole && fits(state.velocity[axis]) && fits(state.previous_rate[axis]);
+    if (!whole) throw Error("flow state", "belongs to another grid", "resume with the case that wrote it");
+    velocity_ = state.velocity;
+    pressure_ = state.pressure;
+    rate_ = state.previous_rate;
+    has_fines_ = !state.void_fraction.empty();
+    if (has_fines_) porous_fields_for_writing().void_fraction = state.void_fraction;
+    const double* s = state.scalars.data();
+    previous_dt_ = s[0], step_limit_ = s[1], times_.steps = std::uint64_t(s[3]);
+    const double speed = s[2];
+    s += 4;
+    momentum_ = MomentumTally{};
+    for (Eigen::Vector3d* v : {&flux_rate_, &advective_sum_, &pending_defect_, &momentum_.after}) {
+        *v = Eigen::Vector3d(s[0], s[1], s[2]);
+        s += 3;
+    }
+    find_fluid_mass();
+    diagnose();
+    max_speed_ = speed;
+}
+
+}  // namespace coral::fluid

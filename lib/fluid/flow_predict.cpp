@@ -1,0 +1,273 @@
+// The explicit half of a step: convection, viscosity, old pressure gradient, drag of the fines.
+#include <chrono>
+
+#include "core/parallel.h"
+#include "fluid/detail/advection.h"
+#include "fluid/detail/faces.h"
+#include "fluid/detail/lanes.h"
+#include "fluid/flow.h"
+
+namespace coral::fluid {
+
+using detail::ComponentView;
+using detail::FaceRange;
+using detail::low_flux;
+using detail::low_volume_flux;
+using detail::planes_per_block;
+
+namespace {
+
+double seconds_since(std::chrono::steady_clock::time_point start)
+{
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+}  // namespace
+
+template <bool porous>
+static ComponentView view_of(int axis, const Layout& layout, const std::array<Field, 3>& velocity, const std::array<Field, 3>& flux,
+                             const Field& eps, double viscous)
+{
+    ComponentView view;
+    view.u = velocity[axis].data();
+    for (int d = 0; d < 3; ++d) {
+        view.q[d] = porous ? flux[d].data() : velocity[d].data();
+        view.stride[d] = layout.stride[d];
+    }
+    view.eps = porous ? eps.data() : nullptr;
+    view.axis = axis;
+    view.viscous = viscous;
+    return view;
+}
+
+/// One component: rate = -div(flux) (+ u div q with fines), u* = u + dt (now rate - before old rate)/eps - dt grad p + dt f.
+/// Each flux is computed once: rows keep those of the low y side, planes those of the low z side.
+template <bool porous, Convection convection>
+void Flow::sweep_component(int axis, double dt, double now, double before)
+{
+    const double h = grid_.cell;
+    const ComponentView view =
+        view_of<porous>(axis, layout_, velocity_, volume_flux_, porous_.void_fraction, options_.kinematic_viscosity / h);
+    const FaceRange range(grid_, axis);
+    const std::ptrdiff_t sy = layout_.stride[1], sz = layout_.stride[2], own = layout_.stride[axis];
+    const std::ptrdiff_t n = range.row_length();
+    const double acceleration = options_.body_acceleration[axis];
+    const double inverse_h = 1.0 / h;
+    const double* const u = view.u;
+    const double* const p = pressure_.data();
+    const double* const eps = porous ? porous_.void_fraction.data() : nullptr;
+    double* const out = provisional_[axis].data();
+    double* const rate = rate_[axis].data();
+    const std::size_t block_size = std::size_t(sz + 2 * sy);
+    advective_sum_[axis] = parallel_sum(range.planes(), planes_per_block, 0.0, [&](std::size_t begin, std::size_t end) {
+        double* __restrict gz = scratch_.data() + begin / planes_per_block * block_size;
+        double* __restrict gy = gz + sz;
+        double* __restrict gx = gy + sy;
+        double advective = 0.0;
+        const int k_begin = range.low.z() + int(begin), k_end = range.low.z() + int(end);
+        for (int j = range.low.y(); j < range.high.y(); ++j) {
+            const auto f0 = std::ptrdiff_t(layout_.index(range.low.x(), j, k_begin));
+            double* __restrict g = gz + j * sy;
+            for (std::ptrdiff_t i = 0; i < n; ++i) g[i] = low_flux<porous, convection>(view, 2, f0 + i);
+        }
+        for (int k = k_begin; k < k_end; ++k) {
+            const auto first = std::ptrdiff_t(layout_.index(range.low.x(), range.low.y(), k));
+            for (std::ptrdiff_t i = 0; i < n; ++i) gy[i] = low_flux<porous, convection>(view, 1, first + i);
+            for (int j = range.low.y(); j < range.high.y(); ++j) {
+                const auto f0 = std::ptrdiff_t(layout_.index(range.low.x(), j, k));
+                for (std::ptrdiff_t i = 0; i <= n; ++i) gx[i] = low_flux<porous, convection>(view, 0, f0 + i);
+                double* __restrict g = gz + j * sy;
+#pragma GCC ivdep
+                for (std::ptrdiff_t i = 0; i < n; ++i) {
+                    const std::ptrdiff_t f = f0 + i;
+                    const double high_y = low_flux<porous, convection>(view, 1, f + sy);
+                    const double high_z = low_flux<porous, convection>(view, 2, f + sz);
+                    double r = ((gx[i] - gx[i + 1]) + (gy[i] - high_y) + (g[i] - high_z)) * inverse_h;
+                    gy[i] = high_y;
+                    g[i] = high_z;
+                    double face_eps = 1.0;
+                    if constexpr (porous) {
+                        face_eps = 0.5 * (eps[f] + eps[f - own]);
+                        if constexpr (convection != Convection::none) {
+                            double divergence = 0.0;
+                            for (int d = 0; d < 3; ++d)
+                                divergence += low_volume_flux(view, d, f + view.stride[d]) - low_volume_flux(view, d, f);
+                            r += u[f] * divergence * inverse_h;
+                        }
+                    }
+                    const double ab = now * r - before * rate[f];
+                    rate[f] = r;
+                    out[f] = u[f] + dt * ((porous ? ab / face_eps : ab) - (p[f] - p[f - own]) * inverse_h + acceleration);
+                }
+                if constexpr (porous && convection != Convection::none) {
+                    const auto transported = [&](std::ptrdiff_t i) {
+                        double divergence = 0.0;
+                        for (int d = 0; d < 3; ++d)
+                            divergence += low_volume_flux(view, d, f0 + i + view.stride[d]) - low_volume_flux(view, d, f0 + i);
+                        return u[f0 + i] * divergence;
+                    };
+                    advective += detail::weighted_row(
+                        grid_, axis, range, j, k, [](std::ptrdiff_t m, const auto& v) { return detail::lane_sum(m, v); }, transported);
+                }
+            }
+        }
+        return advective;
+    });
+    advective_sum_[axis] *= options_.density * h * h;
+}
+
+template <Convection convection>
+void Flow::sweep_all(double dt, double now, double before)
+{
+    for (int axis = 0; axis < 3; ++axis) {
+        if (has_fines_)
+            sweep_component<true, convection>(axis, dt, now, before);
+        else
+            sweep_component<false, convection>(axis, dt, now, before);
+    }
+}
+
+/// eps u on every face, ghosts included.
+void Flow::build_volume_flux()
+{
+    if (volume_flux_[0].empty())
+        for (Field& f : volume_flux_) f = layout_.make_field();
+    const double* eps = porous_.void_fraction.data();
+    const auto planes = layout_.total / std::size_t(layout_.stride[2]);
+    parallel_blocks(planes, planes_per_block, [&](std::size_t begin, std::size_t end) {
+        for (int axis = 0; axis < 3; ++axis) {
+            const std::ptrdiff_t s = layout_.stride[axis];
+            const std::ptrdiff_t first = std::max(std::ptrdiff_t(begin) * layout_.stride[2], s);
+            const double* u = velocity_[axis].data();
+            double* q = volume_flux_[axis].data();
+            for (std::ptrdiff_t f = first; f < std::ptrdiff_t(end) * layout_.stride[2]; ++f) q[f] = 0.5 * (eps[f] + eps[f - s]) * u[f];
+        }
+    });
+}
+
+/// Momentum entering the fluid through the domain's sides per time [N], with the same fluxes as the sweep.
+template <bool porous, Convection convection>
+Eigen::Vector3d Flow::boundary_flux_rate() const
+{
+    Eigen::Vector3d total = Eigen::Vector3d::Zero();
+    for (int axis = 0; axis < 3; ++axis) {
+        const ComponentView view = view_of<porous>(axis, layout_, velocity_, volume_flux_, porous_.void_fraction,
+                                                   options_.kinematic_viscosity / grid_.cell);
+        const FaceRange range(grid_, axis);
+        for (int d = 0; d < 3; ++d) {
+            if (grid_.periodic(d)) continue;
+            const int a = d == 0 ? 1 : 0, b = d == 2 ? 1 : 2;
+            const std::ptrdiff_t s = layout_.stride[d];
+            for (int side = 0; side < 2; ++side) {
+                double sum = 0.0;
+                Eigen::Vector3i c;
+                c[d] = side == 0 ? range.low[d] : range.high[d];
+                for (c[b] = range.low[b]; c[b] < range.high[b]; ++c[b])
+                    for (c[a] = range.low[a]; c[a] < range.high[a]; ++c[a]) {
+                        const auto f = std::ptrdiff_t(layout_.index(c.x(), c.y(), c.z()));
+                        double flux = low_flux<porous, convection>(view, d, f);
+                        // half of the control volume of an outlet face is outside: the flux at the face is the mean of both sides
+                        if (d == axis && grid_.outlet(d, side))
+                            flux = 0.5 * (flux + low_flux<porous, convection>(view, d, side == 0 ? f + s : f - s));
+                        const double weight = axis == d ? 1.0 : detail::face_weight(grid_, axis, c[axis]);
+                        sum += weight * flux;
+                    }
+                total[axis] += side == 0 ? sum : -sum;
+            }
+        }
+    }
+    return options_.density * grid_.cell * grid_.cell * total;
+}
+
+Eigen::Vector3d Flow::boundary_flux_rate() const
+{
+    switch (options_.convection) {
+        case Convection::none:
+            return has_fines_ ? boundary_flux_rate<true, Convection::none>() : boundary_flux_rate<false, Convection::none>();
+        case Convection::koren:
+            return has_fines_ ? boundary_flux_rate<true, Convection::koren>() : boundary_flux_rate<false, Convection::koren>();
+        case Convection::up3: break;
+    }
+    return has_fines_ ? boundary_flux_rate<true, Convection::up3>() : boundary_flux_rate<false, Convection::up3>();
+}
+
+/// Repairs the momentum moved by the porosity field with a uniform acceleration, then applies the drag of the fines:
+/// eps u* <- eps u* + dt (A u^n - B - A u*)   [fluid-notes, eq. 5, with A = eps K, B = eps G].
+void Flow::apply_fines(double dt)
+{
+    const double volume = options_.density * grid_.cell_volume();
+    momentum_.porosity_defect = pending_defect_ + dt * advective_rate_;
+    pending_defect_.setZero();
+    for (int axis = 0; axis < 3; ++axis) {
+        const FaceRange range(grid_, axis);
+        const std::ptrdiff_t own = layout_.stride[axis];
+        const double repair = fluid_mass_[axis] > 0.0 ? -momentum_.porosity_defect[axis] / fluid_mass_[axis] : 0.0;
+        const double* eps = porous_.void_fraction.data();
+        const double* A = porous_.drag_rate[axis].data();
+        const double* B = porous_.drag_force[axis].data();
+        const double* p = pressure_.data();
+        const double* u = velocity_[axis].data();
+        double* __restrict us = provisional_[axis].data();
+        using Pair = Eigen::Vector2d;  // drag on the fluid, pressure gradient on the fines
+        const Pair sums = parallel_sum(range.planes(), planes_per_block, Pair(0.0, 0.0), [&](std::size_t begin, std::size_t end) {
+            Pair sum(0.0, 0.0);
+            for (int k = range.low.z() + int(begin); k < range.low.z() + int(end); ++k)
+                for (int j = range.low.y(); j < range.high.y(); ++j) {
+                    const auto f0 = std::ptrdiff_t(layout_.index(range.low.x(), j, k));
+                    const auto lanes = [](std::ptrdiff_t m, const auto& v) { return detail::lane_sum(m, v); };
+                    // value() is called twice at outlet ends: it must not change us, so the update comes afterwards
+                    const auto drag = [&](std::ptrdiff_t i) {
+                        const std::ptrdiff_t f = f0 + i;
+                        const double face_eps = 0.5 * (eps[f] + eps[f - own]);
+                        const double start = us[f] + repair;
+                        return face_eps * ((face_eps * start + dt * (A[f] * u[f] - B[f])) / (face_eps + dt * A[f]) - start);
+                    };
+                    const auto fines = [&](std::ptrdiff_t i) {
+                        const std::ptrdiff_t f = f0 + i;
+                        return (0.5 * (eps[f] + eps[f - own]) - 1.0) * (p[f] - p[f - own]);
+                    };
+                    sum[0] += detail::weighted_row(grid_, axis, range, j, k, lanes, drag);
+                    sum[1] += detail::weighted_row(grid_, axis, range, j, k, lanes, fines);
+                    for (std::ptrdiff_t f = f0; f < f0 + range.row_length(); ++f) {
+                        const double face_eps = 0.5 * (eps[f] + eps[f - own]);
+                        us[f] = (face_eps * (us[f] + repair) + dt * (A[f] * u[f] - B[f])) / (face_eps + dt * A[f]);
+                    }
+                }
+            return sum;
+        });
+        momentum_.drag[axis] = volume * sums[0];
+        momentum_.fines_pressure[axis] = volume / grid_.cell * dt * sums[1];
+    }
+}
+
+void Flow::predict(double dt)
+{
+    const auto start = std::chrono::steady_clock::now();
+    const Eigen::Vector3d last = momentum_.after;
+    momentum_ = MomentumTally{};
+    momentum_.before = last;
+    // Adams-Bashforth 2 for a changing step; the ratio is limited because a far extrapolation of a noisy rate is not stable
+    const double ratio = previous_dt_ > 0.0 ? std::min(dt / previous_dt_, 1.5) : 0.0;
+    const double now = 1.0 + 0.5 * ratio, before = 0.5 * ratio;
+    if (has_fines_) build_volume_flux();
+    const Eigen::Vector3d rate = boundary_flux_rate();
+    momentum_.boundary_flux = dt * (now * rate - before * flux_rate_);
+    flux_rate_ = rate;
+    const Eigen::Vector3d advective_before = advective_sum_;
+    switch (options_.convection) {
+        case Convection::none: sweep_all<Convection::none>(dt, now, before); break;
+        case Convection::up3: sweep_all<Convection::up3>(dt, now, before); break;
+        case Convection::koren: sweep_all<Convection::koren>(dt, now, before); break;
+    }
+    advective_rate_ = now * advective_sum_ - before * advective_before;
+    momentum_.body = dt * fluid_mass_.cwiseProduct(options_.body_acceleration);
+    step_limit_ = options_.step_growth * stable_time_step();
+    const auto swept = std::chrono::steady_clock::now();
+    times_.predictor += std::chrono::duration<double>(swept - start).count();
+    if (has_fines_) {
+        apply_fines(dt);
+        times_.fines += seconds_since(swept);
+    }
+}
+
+}  // namespace coral::fluid
