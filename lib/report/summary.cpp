@@ -1,0 +1,123 @@
+#include "report/summary.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+
+namespace coral::report {
+namespace {
+
+constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+
+double last_of(const CaseData& data, const std::string& name)
+{
+    const Series* series = data.find(name);
+    return series && series->width == 1 ? series->values.back() : unknown;
+}
+
+double greatest_magnitude(const CaseData& data, const std::string& name)
+{
+    const Series* series = data.find(name);
+    if (!series) return unknown;
+    double greatest = unknown;
+    for (double v : series->values)
+        if (std::isfinite(v) && !(std::abs(v) <= greatest)) greatest = std::abs(v);
+    return greatest;
+}
+
+/// First, least and last of the finite positive values, with the times of the first and the last.
+void conductivity(const CaseData& data, Summary& summary)
+{
+    const Series* series = data.find("hydraulic_conductivity");
+    if (!series || series->width != 1) return;
+    for (std::size_t i = 0; i < series->steps(); ++i) {
+        const double k = series->at(i);
+        if (!std::isfinite(k) || k <= 0) continue;
+        if (std::isnan(summary.conductivity_first)) {
+            summary.conductivity_first = summary.conductivity_least = k;
+            summary.conductivity_first_time = data.time[i];
+        }
+        summary.conductivity_least = std::min(summary.conductivity_least, k);
+        summary.conductivity_last = k;
+        summary.conductivity_last_time = data.time[i];
+    }
+}
+
+/// Fines of the layers plus those eroded, at one output.
+double counted_fines(const CaseData& data, std::size_t step)
+{
+    const Series* fines = data.find("fines_count");
+    if (!fines || fines->width != 3) return unknown;
+    const Series* eroded = data.find("eroded_count");
+    return fines->at(step, 0) + fines->at(step, 1) + fines->at(step, 2) + (eroded ? eroded->at(step) : 0);
+}
+
+void warn(const CaseData& data, Summary& summary)
+{
+    if (data.duration > 0 && summary.end_time < data.duration * (1 - 1e-6))
+        summary.warnings.push_back("The run stopped at " + short_number(summary.end_time) + " s of " + short_number(data.duration) +
+                                   " s; suffuse --resume goes on.");
+    for (const auto& [name, series] : data.series) {
+        // A ratio over a flow that does not run yet is no number at the start; later it is a fault.
+        const std::size_t from = std::min(series.values.size(), series.width);
+        const auto bad = std::count_if(series.values.begin() + static_cast<std::ptrdiff_t>(from), series.values.end(), [](double v) { return std::isinf(v); });
+        if (bad > 0) summary.warnings.push_back("The series " + name + " holds " + std::to_string(bad) + " infinite values.");
+    }
+    const double kinetic = last_of(data, "kinetic_energy");
+    if (data.find("kinetic_energy") && !std::isfinite(kinetic)) summary.warnings.push_back("The kinetic energy is not finite at the end: the run diverged.");
+    if (summary.mass_error > 1e-3 && data.find("mass_balance_error")->unit == "1")
+        summary.warnings.push_back("The mass balance is off by up to " + short_number(summary.mass_error, 2) + " (relative).");
+    if (summary.momentum_error > 1e-2 && data.find("momentum_balance_error")->unit == "1")
+        summary.warnings.push_back("The momentum balance is off by up to " + short_number(summary.momentum_error, 2) + " (relative).");
+}
+
+}  // namespace
+
+std::string short_number(double value, int digits)
+{
+    if (!std::isfinite(value)) return "-";
+    char text[48];
+    std::snprintf(text, sizeof text, "%.*g", digits, value);
+    return text;
+}
+
+Summary summarise(const CaseData& data)
+{
+    Summary s{};
+    s.end_time = data.time.back();
+    s.eroded_mass_fraction = last_of(data, "eroded_mass_fraction");
+    s.eroded_count = last_of(data, "eroded_count");
+    s.fines_at_start = counted_fines(data, 0);
+    s.trapped_count = last_of(data, "trapped_count");
+    s.gradient_first = unknown;
+    if (const Series* gradient = data.find("hydraulic_gradient"); gradient && gradient->width == 1)
+        if (const auto first = std::ranges::find_if(gradient->values, [](double v) { return std::isfinite(v) && v != 0; }); first != gradient->values.end())
+            s.gradient_first = *first;
+    s.gradient_last = last_of(data, "hydraulic_gradient");
+    s.conductivity_first = s.conductivity_least = s.conductivity_last = s.conductivity_first_time = s.conductivity_last_time = unknown;
+    conductivity(data, s);
+    s.mass_error = greatest_magnitude(data, "mass_balance_error");
+    s.momentum_error = greatest_magnitude(data, "momentum_balance_error");
+    warn(data, s);
+    return s;
+}
+
+std::string verdict(const Summary& s)
+{
+    std::string text;
+    if (std::isfinite(s.eroded_mass_fraction)) {
+        text = short_number(100 * s.eroded_mass_fraction, 3) + " % of the fines' mass eroded in " + short_number(s.end_time) + " s";
+        if (std::isfinite(s.eroded_count))
+            text += " (" + short_number(s.eroded_count, 9) + (std::isfinite(s.fines_at_start) ? " of " + short_number(s.fines_at_start, 9) : "") + " fines)";
+    } else {
+        text = "Ran to " + short_number(s.end_time) + " s; no erosion was measured";
+    }
+    if (std::isfinite(s.trapped_count)) text += "; " + short_number(s.trapped_count, 9) + " trapped inside grains";
+    if (std::isfinite(s.conductivity_first))
+        text += "; hydraulic conductivity from " + short_number(100 * s.conductivity_first, 3) + " to " + short_number(100 * s.conductivity_last, 3) +
+                " cm/s (× " + short_number(s.conductivity_last / s.conductivity_first, 3) + ")";
+    return text + ".";
+}
+
+}  // namespace coral::report
