@@ -76,12 +76,12 @@ public:
     /// u* <- u* + w (u_s - u*) with the motions at the end of the contact steps [eq. 7]; books the impulse in the flow's tally.
     void apply(Flow& flow, std::span<const RigidMotion> motions);
 
-    /// Solid fraction of cells (mean of their six faces), padded like a field of the flow, ghosts 0.
+    /// Solid fraction of cells, overlaps clipped at 1, padded like a field of the flow, ghosts 0.
     const Field& cell_solid_fraction() const { return cell_solid_; }
     /// Solid fraction of faces of a component, overlaps clipped at 1.
     const Field& face_solid_fraction(int axis) const { return face_solid_[axis]; }
-    /// Volume of a body as the faces see it (mean over the components) [m3].
-    double face_volume(std::size_t body) const;
+    /// Volume of a body as the cells of the domain see it [m3].
+    double seen_volume(std::size_t body) const;
     /// Counts place() calls that changed anything.
     std::uint64_t version() const { return version_; }
 
@@ -91,13 +91,12 @@ public:
     void restore(std::span<const RigidMotion> placed_motions);
 
 private:
-    struct Run;       // faces in a row with solid fraction 1
-    struct CutFace;   // one face with a fraction
-    struct Body;      // faces of one body
-    struct Shared;    // a face on which several bodies meet
+    struct Body;    // faces of one body
+    struct Shared;  // a face on which several bodies meet
 
     void rasterise(Body& body) const;
     void merge();
+    double shared_velocity(const Shared& shared, std::span<const RigidMotion> motions) const;
 
     GridSpec grid_;
     Layout layout_;

@@ -1,0 +1,417 @@
+#include "fluid/immersed.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "core/error.h"
+#include "core/parallel.h"
+#include "fluid/detail/lanes.h"
+#include "fluid/detail/raster.h"
+
+namespace coral::fluid {
+
+using detail::CutFace;
+using detail::SolidRun;
+using detail::SolidSet;
+using Eigen::Vector3d;
+
+struct ImmersedBodies::Body {
+    BodyShape shape;
+    RigidMotion placed;
+    bool found = false;                  ///< faces belong to `placed`
+    std::array<SolidSet, 4> solid;       ///< components and cells
+    std::array<std::vector<SolidRun>, 3> own_runs;  ///< runs without the faces shared with other bodies
+};
+
+struct ImmersedBodies::Shared {
+    struct Share {
+        std::uint32_t body = 0;
+        double part = 0.0;                 ///< of the sum of fractions
+        std::int16_t i = 0, j = 0, k = 0;  ///< the face as the body sees it: bodies may meet across a periodic side
+    };
+    std::uint32_t at = 0;
+    int component = 0;
+    double fraction = 0.0, weight = 0.0;
+    std::vector<Share> shares;
+};
+
+BodyShape sphere_shape(double diameter)
+{
+    const double radius = 0.5 * diameter;
+    BodyShape shape;
+    shape.box_min.setConstant(-radius);
+    shape.box_max.setConstant(radius);
+    shape.distance = [radius](std::span<const Vector3d> points, std::span<double> distances) {
+        for (std::size_t p = 0; p < points.size(); ++p) distances[p] = points[p].norm() - radius;
+    };
+    return shape;
+}
+
+BodyShape plate_shape(double thickness, double hole, double pitch, const Eigen::Vector2d& half_size, bool holes_off_centre)
+{
+    if (!(thickness > 0.0)) throw UsageError("wall.thickness", "is not positive", "give the plate's thickness, such as \"2mm\"");
+    if (!(hole > 0.0 && hole < pitch))
+        throw UsageError("wall.hole", "does not leave a web between holes", "choose hole smaller than pitch, both positive");
+    BodyShape shape;
+    shape.box_max = Vector3d(half_size.x(), half_size.y(), 0.5 * thickness);
+    shape.box_min = -shape.box_max;
+    const double shift = holes_off_centre ? 0.5 * pitch : 0.0;
+    shape.distance = [=](std::span<const Vector3d> points, std::span<double> distances) {
+        const auto inside_hole = [&](double x) {  // depth inside the nearest hole along one axis, negative in the web
+            const double y = x - shift;
+            return 0.5 * hole - std::abs(y - pitch * std::round(y / pitch));
+        };
+        for (std::size_t p = 0; p < points.size(); ++p) {
+            const double in_plate = std::abs(points[p].z()) - 0.5 * thickness;
+            distances[p] = std::max(in_plate, std::min(inside_hole(points[p].x()), inside_hole(points[p].y())));
+        }
+    };
+    return shape;
+}
+
+ImmersedBodies::ImmersedBodies(const GridSpec& grid, const ForcingOptions& options)
+    : grid_(grid), layout_(grid.cells), options_(options)
+{
+    for (Field& f : face_solid_) f = layout_.make_field();
+    cell_solid_ = layout_.make_field();
+}
+ImmersedBodies::ImmersedBodies(ImmersedBodies&&) noexcept = default;
+ImmersedBodies& ImmersedBodies::operator=(ImmersedBodies&&) noexcept = default;
+ImmersedBodies::~ImmersedBodies() = default;
+
+std::size_t ImmersedBodies::add(BodyShape shape, const RigidMotion& motion)
+{
+    auto body = std::make_unique<Body>();
+    body->shape = std::move(shape);
+    body->placed = motion;
+    bodies_.push_back(std::move(body));
+    actions_.emplace_back();
+    return bodies_.size() - 1;
+}
+
+void ImmersedBodies::rasterise(Body& body) const
+{
+    for (int component = 0; component < 4; ++component)
+        body.solid[component] = detail::find_solid(grid_, layout_, component, body.shape, body.placed);
+    body.found = true;
+}
+
+void ImmersedBodies::place(std::span<const RigidMotion> motions)
+{
+    const double tolerance = options_.reshape_distance * grid_.cell;
+    std::vector<std::size_t> moved;
+    for (std::size_t b = 0; b < bodies_.size(); ++b) {
+        Body& body = *bodies_[b];
+        const double reach = body.shape.box_min.cwiseAbs().cwiseMax(body.shape.box_max.cwiseAbs()).norm();
+        const double travel = (motions[b].position - body.placed.position).norm() +
+                              reach * motions[b].orientation.angularDistance(body.placed.orientation);
+        if (body.found && !(travel > tolerance)) continue;
+        body.placed = motions[b];
+        moved.push_back(b);
+    }
+    if (moved.empty()) return;
+    parallel_blocks(moved.size(), 1, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t m = begin; m < end; ++m) rasterise(*bodies_[moved[m]]);
+    });
+    merge();
+}
+
+std::vector<RigidMotion> ImmersedBodies::placed_motions() const
+{
+    std::vector<RigidMotion> motions;
+    for (const auto& body : bodies_) motions.push_back(body->placed);
+    return motions;
+}
+
+void ImmersedBodies::restore(std::span<const RigidMotion> placed_motions)
+{
+    if (placed_motions.size() != bodies_.size())
+        throw Error("immersed bodies", "the checkpoint holds another number of bodies", "resume with the case that wrote it");
+    for (std::size_t b = 0; b < bodies_.size(); ++b) {
+        bodies_[b]->placed = placed_motions[b];
+        bodies_[b]->found = false;
+    }
+    place(placed_motions);
+}
+
+/// Sums the solid fractions of all bodies and sets aside the faces on which several meet.
+void ImmersedBodies::merge()
+{
+    struct Claim {
+        std::uint32_t at, body;
+        CutFace face;
+    };
+    std::array<std::vector<Claim>, 3> claims;
+    parallel_blocks(4, 1, [&](std::size_t component, std::size_t) {
+        Field& sum = component < 3 ? face_solid_[component] : cell_solid_;
+        std::fill(sum.begin(), sum.end(), 0.0);
+        for (const auto& body : bodies_) {
+            const SolidSet& set = body->solid[component];
+            for (const SolidRun& run : set.runs)
+                for (int l = 0; l < run.length; ++l) sum[run.at + std::uint32_t(l)] += 1.0;
+            for (const CutFace& cut : set.cuts) sum[cut.at] += double(cut.fraction);
+        }
+        if (component == detail::cells_component) {
+            for (double& value : sum) value = std::min(value, 1.0);
+            return;
+        }
+        for (std::size_t b = 0; b < bodies_.size(); ++b) {
+            SolidSet& set = bodies_[b]->solid[component];
+            std::vector<SolidRun>& own = bodies_[b]->own_runs[component];
+            own.clear();
+            for (CutFace& cut : set.cuts) {
+                cut.shared = sum[cut.at] != double(cut.fraction);
+                if (cut.shared) claims[component].push_back({cut.at, std::uint32_t(b), cut});
+            }
+            for (const SolidRun& run : set.runs) {
+                bool open = false;  // whether the last own run goes on
+                for (int l = 0; l < run.length; ++l) {
+                    const std::uint32_t at = run.at + std::uint32_t(l);
+                    const auto i = std::int16_t(run.i + l);
+                    if (sum[at] != 1.0) {
+                        claims[component].push_back({at, std::uint32_t(b), {at, i, run.j, run.k, true, 1.0F, 0.0F}});
+                        open = false;
+                    } else if (open) {
+                        ++own.back().length;
+                    } else {
+                        own.push_back({at, i, run.j, run.k, 1});
+                        open = true;
+                    }
+                }
+            }
+        }
+        for (const Claim& claim : claims[component]) sum[claim.at] = std::min(sum[claim.at], 1.0);
+    });
+    shared_.clear();
+    for (int component = 0; component < 3; ++component) {
+        std::vector<Claim>& list = claims[component];
+        std::sort(list.begin(), list.end(), [](const Claim& a, const Claim& b) { return std::pair(a.at, a.body) < std::pair(b.at, b.body); });
+        for (std::size_t first = 0, last = 0; first < list.size(); first = last) {
+            Shared shared;
+            shared.at = list[first].at;
+            shared.component = component;
+            double total = 0.0;
+            for (last = first; last < list.size() && list[last].at == list[first].at; ++last) total += double(list[last].face.fraction);
+            for (std::size_t c = first; c < last; ++c) {
+                const CutFace& face = list[c].face;
+                shared.shares.push_back({list[c].body, double(face.fraction) / total, face.i, face.j, face.k});
+            }
+            shared.fraction = std::min(1.0, total);
+            shared_.push_back(std::move(shared));
+        }
+    }
+    ++version_;
+}
+
+double ImmersedBodies::seen_volume(std::size_t body) const
+{
+    const SolidSet& cells = bodies_[body]->solid[detail::cells_component];
+    double volume = 0.0;
+    for (const SolidRun& run : cells.runs) volume += run.length;
+    for (const CutFace& cut : cells.cuts) volume += double(cut.fraction);
+    return volume * grid_.cell_volume();
+}
+
+namespace {
+
+/// Rigid motion seen from the unwrapped faces of a body that was placed elsewhere, perhaps in another periodic image.
+struct Carrier {
+    Vector3d origin;  ///< of the grid, relative to the body's centre
+    Vector3d velocity, spin;
+    double cell = 0.0;
+
+    Carrier(const GridSpec& grid, const RigidMotion& placed, const RigidMotion& motion)
+        : velocity(motion.velocity), spin(motion.angular_velocity), cell(grid.cell)
+    {
+        Vector3d shift = motion.position - placed.position;
+        for (int d = 0; d < 3; ++d)
+            if (grid.periodic(d)) shift[d] -= grid.size()[d] * std::round(shift[d] / grid.size()[d]);
+        origin = grid.origin - (placed.position + shift);
+    }
+    /// From the body's centre to the middle of face (i, j, k) of a component.
+    Vector3d arm(int component, int i, int j, int k) const
+    {
+        Vector3d r = origin + cell * Vector3d(i + 0.5, j + 0.5, k + 0.5);
+        r[component] -= 0.5 * cell;
+        return r;
+    }
+    double component_velocity(int c, const Vector3d& r) const
+    {
+        const int a = (c + 1) % 3, b = (c + 2) % 3;
+        return velocity[c] + spin[a] * r[b] - spin[b] * r[a];
+    }
+};
+
+/// Adds r x (f e_c) for a sum of f and, along a row, of (x - x0) f.
+void add_torque(Vector3d& torque, int c, const Vector3d& r, double f, double f_times_x)
+{
+    if (c == 0) torque += Vector3d(0.0, r.z() * f, -r.y() * f);
+    if (c == 1) torque += Vector3d(-r.z() * f, 0.0, r.x() * f + f_times_x);
+    if (c == 2) torque += Vector3d(r.y() * f, -(r.x() * f + f_times_x), 0.0);
+}
+
+/// Adds the inertia of a mass that only resists motion along c.
+void add_inertia(Eigen::Matrix3d& inertia, int c, const Vector3d& r, double mass)
+{
+    const int a = (c + 1) % 3, b = (c + 2) % 3;  // velocity along c is spin_a r_b - spin_b r_a
+    inertia(a, a) += mass * r[b] * r[b];
+    inertia(b, b) += mass * r[a] * r[a];
+    inertia(a, b) -= mass * r[a] * r[b];
+    inertia(b, a) -= mass * r[a] * r[b];
+}
+
+/// w of a face with solid fraction phi  [fluid-notes, eq. 7, 8].
+double forcing_weight(const ForcingOptions& options, double phi, double slip, double dt, double nu, double cell)
+{
+    if (phi >= 1.0) return 1.0;
+    if (options.plain_blend) return phi;
+    const double rate = options.viscous_rate * nu / (cell * cell) + options.inertial_rate * std::abs(slip) / cell;
+    const double chi = dt * rate * phi / (1.0 - phi);
+    return chi / (1.0 + chi);
+}
+
+class Stopwatch {
+public:
+    explicit Stopwatch(double& total) : total_(total), start_(std::chrono::steady_clock::now()) {}
+    ~Stopwatch() { total_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
+
+private:
+    double& total_;
+    std::chrono::steady_clock::time_point start_;
+};
+
+/// Reaction of the solid rows of one component; sums of (u* - u_s) eps, not yet times rho V / dt.
+void measure_runs(const Flow& flow, const std::vector<SolidRun>& runs, int c, const Carrier& carrier, FluidAction& action)
+{
+    const double* us = flow.provisional(c).data();
+    const bool porous = flow.porous();
+    // along the row u_s grows by this much per cell
+    const double slope = c == 0 ? 0.0 : (c == 1 ? carrier.spin.z() : -carrier.spin.y()) * carrier.cell;
+    for (const SolidRun& run : runs) {
+        const Vector3d r = carrier.arm(c, run.i, run.j, run.k);
+        const double body = carrier.component_velocity(c, r);
+        const auto eps = [&](std::ptrdiff_t l) { return porous ? flow.face_void_fraction(c, run.at + std::size_t(l)) : 1.0; };
+        const auto slip = [&](std::ptrdiff_t l) { return eps(l) * (us[run.at + std::size_t(l)] - (body + slope * double(l))); };
+        const double f = detail::lane_sum(run.length, slip);
+        const double fx = c == 0 ? 0.0 : detail::lane_sum(run.length, [&](std::ptrdiff_t l) { return carrier.cell * double(l) * slip(l); });
+        action.force[c] += f;
+        add_torque(action.torque, c, r, f, fx);
+        action.forced_mass[c] += porous ? detail::lane_sum(run.length, eps) : double(run.length);
+        // second moment of a row: its middle, and its own spread along x
+        const double n = run.length;
+        const Vector3d middle = r + Vector3d(0.5 * (n - 1.0) * carrier.cell, 0.0, 0.0);
+        add_inertia(action.forced_inertia, c, middle, n);
+        const double spread = n * (n * n - 1.0) / 12.0 * carrier.cell * carrier.cell;
+        if (c == 1) action.forced_inertia(2, 2) += spread;
+        if (c == 2) action.forced_inertia(1, 1) += spread;
+    }
+}
+
+}  // namespace
+
+/// Velocity of the solid on a shared face: mean of the bodies weighted by their fractions.
+double ImmersedBodies::shared_velocity(const Shared& shared, std::span<const RigidMotion> motions) const
+{
+    double solid = 0.0;
+    for (const Shared::Share& share : shared.shares) {
+        const Carrier carrier(grid_, bodies_[share.body]->placed, motions[share.body]);
+        solid += share.part * carrier.component_velocity(shared.component, carrier.arm(shared.component, share.i, share.j, share.k));
+    }
+    return solid;
+}
+
+std::span<const FluidAction> ImmersedBodies::measure(Flow& flow, double dt, std::span<const RigidMotion> motions)
+{
+    const Stopwatch watch(flow.times().forcing);
+    const double nu = flow.options().kinematic_viscosity, cell = grid_.cell;
+    const auto face_action = [&](FluidAction& action, int c, const Vector3d& r, double mass, double slip) {
+        action.force[c] += mass * slip;
+        add_torque(action.torque, c, r, mass * slip, 0.0);
+        action.forced_mass[c] += mass;
+        add_inertia(action.forced_inertia, c, r, mass);
+    };
+    parallel_blocks(bodies_.size(), 1, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t b = begin; b < end; ++b) {
+            Body& body = *bodies_[b];
+            const Carrier carrier(grid_, body.placed, motions[b]);
+            FluidAction action;
+            for (int c = 0; c < 3; ++c) {
+                measure_runs(flow, body.own_runs[c], c, carrier, action);
+                const double* us = flow.provisional(c).data();
+                for (CutFace& cut : body.solid[c].cuts) {
+                    if (cut.shared) continue;
+                    const Vector3d r = carrier.arm(c, cut.i, cut.j, cut.k);
+                    const double slip = us[cut.at] - carrier.component_velocity(c, r);
+                    cut.weight = float(forcing_weight(options_, double(cut.fraction), slip, dt, nu, cell));
+                    face_action(action, c, r, double(cut.weight) * flow.face_void_fraction(c, cut.at), slip);
+                }
+            }
+            actions_[b] = action;
+        }
+    });
+    for (Shared& shared : shared_) {
+        const int c = shared.component;
+        const double slip = flow.provisional(c)[shared.at] - shared_velocity(shared, motions);
+        shared.weight = forcing_weight(options_, shared.fraction, slip, dt, nu, cell);
+        for (const Shared::Share& share : shared.shares) {
+            const Carrier carrier(grid_, bodies_[share.body]->placed, motions[share.body]);
+            face_action(actions_[share.body], c, carrier.arm(c, share.i, share.j, share.k),
+                        share.part * shared.weight * flow.face_void_fraction(c, shared.at), slip);
+        }
+    }
+    const double mass = flow.options().density * grid_.cell_volume();
+    for (FluidAction& action : actions_) {
+        action.force *= mass / dt;
+        action.torque *= mass / dt;
+        action.forced_mass *= mass;
+        action.forced_inertia *= mass;
+    }
+    return actions_;
+}
+
+void ImmersedBodies::apply(Flow& flow, std::span<const RigidMotion> motions)
+{
+    const Stopwatch watch(flow.times().forcing);
+    const auto one = [](std::size_t) { return 1.0; };
+    const auto force_all = [&](auto&& eps_of) {
+        return parallel_sum(bodies_.size(), 1, Vector3d(0.0, 0.0, 0.0), [&](std::size_t b, std::size_t) {
+            const Body& body = *bodies_[b];
+            const Carrier carrier(grid_, body.placed, motions[b]);
+            Vector3d impulse = Vector3d::Zero();
+            for (int c = 0; c < 3; ++c) {
+                double* us = flow.provisional(c).data();
+                const double slope = c == 0 ? 0.0 : (c == 1 ? carrier.spin.z() : -carrier.spin.y()) * carrier.cell;
+                const auto eps = eps_of(c);
+                for (const SolidRun& run : body.own_runs[c]) {
+                    const double solid = carrier.component_velocity(c, carrier.arm(c, run.i, run.j, run.k));
+                    impulse[c] += detail::lane_sum(run.length, [&](std::ptrdiff_t l) {
+                        const std::size_t at = run.at + std::size_t(l);
+                        return eps(at) * (solid + slope * double(l) - us[at]);
+                    });
+                    for (int l = 0; l < run.length; ++l) us[run.at + std::uint32_t(l)] = solid + slope * l;
+                }
+                for (const CutFace& cut : body.solid[c].cuts) {
+                    if (cut.shared) continue;
+                    const double solid = carrier.component_velocity(c, carrier.arm(c, cut.i, cut.j, cut.k));
+                    const double change = double(cut.weight) * (solid - us[cut.at]);
+                    us[cut.at] += change;
+                    impulse[c] += eps(cut.at) * change;
+                }
+            }
+            return impulse;
+        });
+    };
+    Vector3d impulse = flow.porous() ? force_all([&](int c) { return [&flow, c](std::size_t at) { return flow.face_void_fraction(c, at); }; })
+                                     : force_all([&](int) { return one; });
+    for (const Shared& shared : shared_) {
+        const int c = shared.component;
+        double& us = flow.provisional(c)[shared.at];
+        const double change = shared.weight * (shared_velocity(shared, motions) - us);
+        us += change;
+        impulse[c] += flow.face_void_fraction(c, shared.at) * change;
+    }
+    flow.add_forcing_impulse(flow.options().density * grid_.cell_volume() * impulse);
+}
+
+}  // namespace coral::fluid

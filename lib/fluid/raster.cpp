@@ -1,0 +1,145 @@
+#include "fluid/detail/raster.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace coral::fluid::detail {
+
+namespace {
+
+using Eigen::Vector3d;
+using Eigen::Vector3i;
+
+/// Lattice of the corners of all control volumes of a component within a box of them.
+struct Corners {
+    Vector3d origin;  ///< of lattice point (0, 0, 0), world
+    double spacing = 0.0;
+    Vector3i low;   ///< first control volume
+    Vector3i high;  ///< one past the last
+    Vector3i points;
+    std::vector<double> distance;
+
+    bool empty() const { return (high - low).minCoeff() <= 0; }
+    std::size_t index(int i, int j, int k) const
+    {
+        return (std::size_t(k) * std::size_t(points.y()) + std::size_t(j)) * std::size_t(points.x()) + std::size_t(i);
+    }
+};
+
+/// Axis-aligned box of the body in the world.
+void world_box(const BodyShape& shape, const RigidMotion& motion, Vector3d& low, Vector3d& high)
+{
+    const Eigen::Matrix3d turn = motion.orientation.toRotationMatrix();
+    const Vector3d middle = motion.position + turn * (0.5 * (shape.box_min + shape.box_max));
+    const Vector3d half = turn.cwiseAbs() * (0.5 * (shape.box_max - shape.box_min));
+    low = middle - half;
+    high = middle + half;
+}
+
+Corners corners_of(const GridSpec& grid, int component, const BodyShape& shape, const RigidMotion& motion)
+{
+    Vector3d box_low, box_high;
+    world_box(shape, motion, box_low, box_high);
+    Corners c;
+    c.spacing = grid.cell;
+    for (int d = 0; d < 3; ++d) {
+        const double shift = d == component ? 0.5 : 0.0;  // volume i spans (i - shift, i + 1 - shift) cells
+        const int first = component == cells_component || d != component ? 0 : grid.first_unknown(d);
+        const int last = component == cells_component || d != component ? grid.cells[d] : grid.last_unknown(d);
+        const double low = (box_low[d] - grid.origin[d]) / grid.cell + shift, high = (box_high[d] - grid.origin[d]) / grid.cell + shift;
+        if (grid.periodic(d)) {
+            c.low[d] = int(std::floor(low));
+            c.high[d] = std::min(int(std::floor(high)) + 1, c.low[d] + grid.cells[d]);
+        } else {
+            c.low[d] = std::max(first, int(std::floor(std::clamp(low, -1.0, double(last)))));
+            c.high[d] = std::min(last, int(std::floor(std::clamp(high, -1.0, double(last)))) + 1);
+        }
+        c.origin[d] = grid.origin[d] + (c.low[d] - shift) * grid.cell;
+    }
+    c.points = c.high - c.low + Vector3i::Ones();
+    return c;
+}
+
+/// Distances on the lattice. Blocks of points that lie further from the surface than their own size plus the diagonal of a cell are
+/// settled by one query: all volumes with a corner there are then all solid or all fluid, whatever the exact value.
+void sample(Corners& c, const BodyShape& shape, const RigidMotion& motion)
+{
+    c.distance.resize(c.index(0, 0, c.points.z()));
+    const Eigen::Matrix3d to_body = motion.orientation.conjugate().toRotationMatrix();
+    std::vector<Vector3i> blocks, undecided;
+    std::vector<Vector3d> points;
+    std::vector<double> values;
+    int size = 8;
+    for (int k = 0; k < c.points.z(); k += size)
+        for (int j = 0; j < c.points.y(); j += size)
+            for (int i = 0; i < c.points.x(); i += size) blocks.emplace_back(i, j, k);
+    for (; size >= 1; size /= 2) {
+        points.clear();
+        for (const Vector3i& b : blocks) {
+            const Vector3d middle = b.cast<double>() + Vector3d::Constant(0.5 * (size - 1));
+            points.push_back(to_body * (c.origin + c.spacing * middle - motion.position));
+        }
+        values.resize(points.size());
+        shape.distance(points, values);
+        const double settled = 1.05 * std::sqrt(3.0) * (0.5 * (size - 1) + 1.0) * c.spacing;
+        undecided.clear();
+        for (std::size_t b = 0; b < blocks.size(); ++b) {
+            const Vector3i low = blocks[b], high = (low + Vector3i::Constant(size)).cwiseMin(c.points);
+            if (size > 1 && std::abs(values[b]) < settled) {
+                for (int child = 0; child < 8; ++child) {
+                    const Vector3i corner = low + (size / 2) * Vector3i(child & 1, (child >> 1) & 1, child >> 2);
+                    if ((c.points - corner).minCoeff() > 0) undecided.push_back(corner);
+                }
+                continue;
+            }
+            for (int k = low.z(); k < high.z(); ++k)
+                for (int j = low.y(); j < high.y(); ++j)
+                    for (int i = low.x(); i < high.x(); ++i) c.distance[c.index(i, j, k)] = values[b];
+        }
+        blocks.swap(undecided);
+    }
+}
+
+double solid_fraction(const Corners& c, int i, int j, int k)
+{
+    double solid = 0.0, all = 0.0;
+    for (int corner = 0; corner < 8; ++corner) {
+        const double d = c.distance[c.index(i + (corner & 1), j + ((corner >> 1) & 1), k + (corner >> 2))];
+        solid += std::max(-d, 0.0);
+        all += std::abs(d);
+    }
+    return all > 0.0 ? solid / all : 0.0;
+}
+
+int wrap(int i, int n) { return ((i % n) + n) % n; }
+
+}  // namespace
+
+SolidSet find_solid(const GridSpec& grid, const Layout& layout, int component, const BodyShape& shape, const RigidMotion& motion)
+{
+    constexpr double negligible = 1e-6;
+    SolidSet set;
+    Corners c = corners_of(grid, component, shape, motion);
+    if (c.empty()) return set;
+    sample(c, shape, motion);
+    const auto wrapped = [&](int i, int d) { return grid.periodic(d) ? wrap(i, grid.cells[d]) : i; };
+    for (int k = c.low.z(); k < c.high.z(); ++k)
+        for (int j = c.low.y(); j < c.high.y(); ++j)
+            for (int i = c.low.x(); i < c.high.x(); ++i) {
+                const double phi = solid_fraction(c, i - c.low.x(), j - c.low.y(), k - c.low.z());
+                if (phi < negligible) continue;
+                const auto at = std::uint32_t(layout.index(wrapped(i, 0), wrapped(j, 1), wrapped(k, 2)));
+                if (phi < 1.0 - negligible) {
+                    set.cuts.push_back({at, std::int16_t(i), std::int16_t(j), std::int16_t(k), false, float(phi), 0.0F});
+                    continue;
+                }
+                SolidRun* last = set.runs.empty() ? nullptr : &set.runs.back();
+                if (last && last->j == j && last->k == k && last->i + last->length == i && last->at + std::uint32_t(last->length) == at)
+                    ++last->length;
+                else
+                    set.runs.push_back({at, std::int16_t(i), std::int16_t(j), std::int16_t(k), 1});
+            }
+    return set;
+}
+
+}  // namespace coral::fluid::detail
