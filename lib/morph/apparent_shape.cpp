@@ -113,11 +113,18 @@ double widest_constriction(const Closing& closing, const std::vector<std::uint8_
     return widest;
 }
 
-std::size_t count_voids(const std::vector<std::uint8_t>& voids, const Eigen::Vector3i& size)
+/// The width asked of open voids leaves out the dimples that a ball passes over on any rough surface.
+std::size_t count_voids(const Closing& closing, const std::vector<std::uint8_t>& voids, const std::vector<std::uint8_t>& open_void)
 {
-    const Components parts = connected_components(voids, size, 1, Connectivity::faces);
-    return std::size_t(std::count_if(parts.sizes.begin(), parts.sizes.end(),
-                                     [](std::size_t s) { return s >= ApparentShape::smallest_counted_void; }));
+    constexpr std::size_t least_voxels = 8;
+    constexpr float least_squared_distance = 4.0F;  // (1.5 c + c/2)^2
+    const Components parts = connected_components(voids, closing.box.size, 1, Connectivity::faces);
+    std::vector<std::uint8_t> counts(parts.sizes.size(), 0);
+    for (std::size_t v = 0; v < voids.size(); ++v)
+        if (parts.labels[v] && (!open_void[v] || closing.squared[v] >= least_squared_distance)) counts[parts.labels[v] - 1] = 1;
+    std::size_t sum = 0;
+    for (std::size_t p = 0; p < counts.size(); ++p) sum += counts[p] && parts.sizes[p] >= least_voxels;
+    return sum;
 }
 
 }  // namespace
@@ -138,7 +145,7 @@ ApparentShape close_with_ball(const Mask& solid, double radius)
         out.open_void += open_void[v];
     }
     out.closed_void = out.filled - out.solid - out.open_void;
-    if (out.filled > out.solid) out.void_count = count_voids(voids, closing.box.size);
+    if (out.filled > out.solid) out.void_count = count_voids(closing, voids, open_void);
     if (out.open_void > 0) {
         const double b = widest_constriction(closing, open_void);
         if (b > 0) out.largest_throat = (2.0 * b - 1.0) * mean_edge(solid);

@@ -13,10 +13,8 @@ struct ApparentShape {
     std::size_t filled = 0;       ///< voxels of `apparent`
     std::size_t open_void = 0;    ///< void inside the apparent shape that is 6-connected to the outside
     std::size_t closed_void = 0;  ///< void that is not
-    std::size_t void_count = 0;   ///< 6-connected voids of at least `smallest_counted_void` voxels
+    std::size_t void_count = 0;   ///< 6-connected voids of at least eight voxels; open ones must take a ball of radius 1.5 c
     double largest_throat = 0;    ///< diameter of the widest constriction into a void [m]; 0 when no void lies behind one
-
-    static constexpr std::size_t smallest_counted_void = 8;
 };
 
 /// Ball-reachable closing: a void stays outside only if a ball of `radius` rolls into it from outside.

@@ -151,21 +151,33 @@ std::vector<std::uint32_t> watershed(const Mask& mask, double dynamics, std::siz
     return out;
 }
 
+namespace {
+
+/// One closing and watershed. `left_open` is the share of the stack's void that the closing leaves outside.
+WatershedResult split_once(const Mask& solid, double radius, double dynamics, double& left_open)
+{
+    const Mask filled = close_stack(solid, radius);
+    left_open = double(filled.count() - solid_count(filled)) / double(std::max<std::size_t>(solid.count() - solid_count(solid), 1));
+    WatershedResult result;
+    result.closing_radius = radius;
+    result.labels = watershed(filled, dynamics, result.grains);
+    return result;
+}
+
+}  // namespace
+
 WatershedResult split_touching_grains(const Mask& solid, const WatershedOptions& options)
 {
     if (solid_count(solid) == 0) throw Error("watershed", "the stack holds no solid voxel", "check --solid and --threshold");
-    const bool given = options.closing_radius > 0;
     const double c = std::cbrt(solid.voxel_volume());
-    WatershedResult result;
-    result.closing_radius = given ? options.closing_radius : 2.0 * c;
-    for (int pass = 0;; ++pass) {
-        const Mask filled = close_stack(solid, result.closing_radius);
-        result.labels = watershed(filled, options.dynamics, result.grains);
-        if (given || pass == 2) break;
-        const double next = std::max(0.1 * median_diameter(result.labels, result.grains, solid.voxel_volume()), 2.0 * c);
-        const bool settled = std::abs(next - result.closing_radius) < 0.1 * next;
-        if (settled) break;
-        result.closing_radius = next;
+    double left_open = 0;
+    WatershedResult result = split_once(solid, options.closing_radius > 0 ? options.closing_radius : c, options.dynamics, left_open);
+    for (int pass = 0; options.closing_radius <= 0 && pass < 3; ++pass) {
+        const double next = 0.1 * median_diameter(result.labels, result.grains, solid.voxel_volume());
+        if (next < 1.1 * result.closing_radius) break;
+        WatershedResult trial = split_once(solid, next, options.dynamics, left_open);
+        if (left_open < 0.5) break;
+        result = std::move(trial);
     }
     for (std::size_t v = 0; v < result.labels.size(); ++v)
         if (!solid.voxels[v]) result.labels[v] = 0;

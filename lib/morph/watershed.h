@@ -26,8 +26,9 @@ struct WatershedResult {
 ///  3. voxels by falling d: a new basin if no labelled 26-neighbour, else the label of the neighbour with the largest d; when
 ///     basins meet at depth d_s the lower merges if peak - d_s < dynamics * peak + c/2;
 ///  4. labels go back to the solid only.
-/// Without a given radius R starts at two voxels and is renewed twice as 0.1 of the volume-weighted median diameter of the
-/// grains found, since voids unclosed by a small ball break grains up and make them look small.
+/// Without a given radius R starts at one voxel and is renewed as 0.1 of the volume-weighted median diameter of the grains
+/// found, since voids left unclosed break grains up and make them look small. A radius that leaves less than half of the
+/// stack's void outside is refused: it closes the gaps between the grains, as in cemented rock, and the one before is kept.
 /// \throws Error when the stack holds no solid
 WatershedResult split_touching_grains(const Mask& solid, const WatershedOptions& options);
 

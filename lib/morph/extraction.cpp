@@ -1,0 +1,100 @@
+#include "morph/extraction.h"
+
+#include <oneapi/tbb/parallel_for.h>
+#include <oneapi/tbb/task_arena.h>
+
+#include <algorithm>
+#include <cmath>
+#include <mutex>
+#include <numbers>
+#include <optional>
+
+#include "core/error.h"
+
+namespace coral::morph {
+namespace {
+
+double sphere_diameter(double volume) { return std::cbrt(6.0 / std::numbers::pi * volume); }
+
+/// One grain measured, or the reason why it is dropped.
+struct Outcome {
+    std::optional<Grain> grain;
+    DropReason reason = DropReason::small;
+};
+
+Outcome measure_label(std::span<const std::uint32_t> labels, const Eigen::Vector3i& size, const Eigen::Vector3d& voxel_size,
+                      const LabelBox& box, const ExtractionOptions& options)
+{
+    const double least = options.minimum_diameter > 0 ? options.minimum_diameter : 8.0 * voxel_size.maxCoeff();
+    // No shape in a box is larger than the box: the cheap test spares most specks the work.
+    const double box_volume = (box.high - box.low).cast<double>().cwiseProduct(voxel_size).prod();
+    if (box.touches_border && !options.keep_border) return {{}, DropReason::border};
+    if (box.voxels < options.minimum_voxels || sphere_diameter(box_volume) < least) return {{}, DropReason::small};
+
+    Grain grain;
+    grain.box = box;
+    Mask solid = cut_out(labels, size, voxel_size, box);
+    grain.islands = keep_largest_component(solid);
+    ApparentShape closed = close_with_ball(solid, options.closing_radius > 0 ? options.closing_radius : default_closing_radius(solid));
+    const double diameter = sphere_diameter(double(closed.filled) * solid.voxel_volume());
+    if (closed.solid < options.minimum_voxels || diameter < least) return {{}, DropReason::small};
+    try {
+        grain.shape = measure(solid, closed);
+    } catch (const Error&) {
+        return {{}, DropReason::thin};  // no surface left, or all of it in one plane
+    }
+    if (options.scale_to > 0) grain.scale = options.scale_to / diameter;
+    grain.shape = scaled(grain.shape, grain.scale);
+    solid.voxel_size *= grain.scale;
+    closed.apparent.voxel_size *= grain.scale;
+    grain.solid = PackedMask(solid);
+    grain.apparent = PackedMask(closed.apparent);
+    return {std::move(grain), {}};
+}
+
+}  // namespace
+
+Descriptors scaled(Descriptors d, double factor)
+{
+    const double area = factor * factor, volume = area * factor;
+    d.volume *= volume;
+    d.apparent_volume *= volume;
+    d.surface_area *= area;
+    d.apparent_surface_area *= area;
+    d.equivalent_diameter *= factor;
+    d.largest_throat *= factor;
+    d.closing_radius *= factor;
+    return d;
+}
+
+Extraction extract_grains(std::span<const std::uint32_t> labels, const Eigen::Vector3i& size, const Eigen::Vector3d& voxel_size,
+                          const ExtractionOptions& options, const std::function<void(double)>& done)
+{
+    const std::vector<LabelBox> boxes = label_boxes(labels, size);
+    // The largest first: the last grains to finish are then small ones.
+    std::vector<std::size_t> order(boxes.size());
+    for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
+    std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return boxes[a].voxels > boxes[b].voxels; });
+
+    std::vector<Outcome> outcomes(boxes.size());
+    std::mutex report;
+    double finished = 0;
+    tbb::parallel_for(std::size_t{0}, order.size(), [&](std::size_t i) {
+        const LabelBox& box = boxes[order[i]];
+        // Isolated: a thread that waits for the inner loops must not start another grain and its memory.
+        tbb::this_task_arena::isolate([&] { outcomes[order[i]] = measure_label(labels, size, voxel_size, box, options); });
+        if (!done) return;
+        const std::lock_guard lock(report);
+        done(finished += double(box.voxels));
+    });
+
+    Extraction out;
+    for (std::size_t i = 0; i < boxes.size(); ++i) {
+        if (outcomes[i].grain) out.grains.push_back(std::move(*outcomes[i].grain));
+        else out.dropped.push_back({boxes[i], outcomes[i].reason});
+    }
+    std::stable_sort(out.grains.begin(), out.grains.end(), [](const Grain& a, const Grain& b) { return a.shape.volume > b.shape.volume; });
+    return out;
+}
+
+}  // namespace coral::morph

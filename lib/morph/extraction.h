@@ -1,0 +1,53 @@
+#pragma once
+/// \file morph/extraction.h
+/// From a labelled stack to measured single grains: border and size rules, islands, apparent shapes, descriptors.
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "morph/components.h"
+#include "morph/descriptors.h"
+#include "morph/grains.h"
+
+namespace coral::morph {
+
+struct ExtractionOptions {
+    bool keep_border = false;      ///< keep grains the border of the stack cuts
+    double minimum_diameter = 0;   ///< equivalent diameter of the apparent shape in the CT [m]; 0 = eight voxel edges
+    std::size_t minimum_voxels = 64;
+    double closing_radius = 0;     ///< of the ball [m, in the CT]; 0 = 0.1 of each grain's filled diameter
+    double scale_to = 0;           ///< equivalent diameter every grain is scaled to [m]; 0 = sizes as in the CT
+};
+
+struct Grain {
+    LabelBox box;
+    Islands islands;         ///< pieces cut off the largest one
+    PackedMask solid;        ///< voxel_size scaled
+    PackedMask apparent;
+    Descriptors shape;       ///< lengths scaled
+    double scale = 1.0;      ///< factor on lengths
+};
+
+enum class DropReason { border, small, thin };
+
+struct Dropped {
+    LabelBox box;
+    DropReason reason = DropReason::small;
+};
+
+struct Extraction {
+    std::vector<Grain> grains;     ///< by falling volume of the solid, label among equals
+    std::vector<Dropped> dropped;  ///< by rising label: nothing vanishes silently
+};
+
+/// Measures all grains, several at a time. The result does not depend on the number of threads.
+/// \param done  called after each grain with the voxels finished so far (from any thread, one at a time); may be empty
+Extraction extract_grains(std::span<const std::uint32_t> labels, const Eigen::Vector3i& size, const Eigen::Vector3d& voxel_size,
+                          const ExtractionOptions& options, const std::function<void(double)>& done = {});
+
+/// Descriptors of the grain with all lengths multiplied by `factor`.
+Descriptors scaled(Descriptors shape, double factor);
+
+}  // namespace coral::morph
