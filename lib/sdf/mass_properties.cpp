@@ -8,15 +8,7 @@
 namespace coral::sdf {
 namespace {
 
-constexpr double support = 1.5;  // of smoothed_solid, in spacings
-
-/// Cosine Heaviside of half-width e, 1 at s <= -e.
-double cosine_step(double s, double e)
-{
-    if (s <= -e) return 1.0;
-    if (s >= e) return 0.0;
-    return 0.5 * (1.0 - s / e - std::sin(std::numbers::pi * s / e) / std::numbers::pi);
-}
+constexpr double support = 1.0;  // of smoothed_solid, in spacings
 
 using Moments = Eigen::Array<double, 10, 1>;  // 1; x y z; xx yy zz; xy yz zx
 
@@ -24,7 +16,9 @@ using Moments = Eigen::Array<double, 10, 1>;  // 1; x y z; xx yy zz; xy yz zx
 
 double smoothed_solid(double s)
 {
-    return (4.0 * cosine_step(s, 0.5 * support) - cosine_step(s, support)) / 3.0;
+    if (s <= -support) return 1.0;
+    if (s >= support) return 0.0;
+    return 0.5 * (1.0 - s - std::numbers::pi / 6.0 * std::sin(std::numbers::pi * s));
 }
 
 MassProperties mass_properties(const DistanceGrid& grid)

@@ -14,15 +14,16 @@ struct MassProperties {
 };
 
 /// Sums over the nodes weighted by smoothed_solid(d/h) h^3.
-/// \pre every node within 1.5 spacings of the surface holds its distance (any band of 2 nodes does)
+/// \pre every node within one spacing of the surface holds its distance (any band of 2 nodes does)
 MassProperties mass_properties(const DistanceGrid& grid);
 
 /// Volume alone, of the surface d + shift = 0 [m^3].
 double solid_volume(const DistanceGrid& grid, double shift = 0.0);
 
-/// Smoothed Heaviside: share of solid at distance s (in spacings, negative in solid), 1 deep inside, 0 far outside.
-/// (4 H_e - H_2e)/3 with the cosine Heaviside H_e and e = 3/4: the kernel's second moment vanishes, so that curvature leaves
-/// no bias (the cosine alone errs by +0.4 (h/R)^2 on a sphere).
+/// Smoothed Heaviside: share of solid at distance s (in spacings, negative in solid), 1 for s <= -1, 0 for s >= 1:
+///     H(s) = (1 - s - (pi/6) sin(pi s))/2
+/// The usual cosine Heaviside has 1/pi for pi/6 and errs by +0.4 (h/R)^2 on a sphere. With pi/6 the kernel's second moment
+/// vanishes, so that curvature leaves no bias, and sums over the lattice stay exact for planes along it.
 double smoothed_solid(double s);
 
 }  // namespace coral::sdf

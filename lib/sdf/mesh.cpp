@@ -1,5 +1,6 @@
 #include "sdf/mesh.h"
 
+#include <Eigen/Geometry>
 #include <array>
 #include <fstream>
 
@@ -138,14 +139,14 @@ void finish(OutputFile& output, std::ofstream& stream, const std::filesystem::pa
 
 TriangleMesh extract_mesh(const DistanceGrid& grid) { return Mesher(grid).run(); }
 
+double triangle_area(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c) { return 0.5 * (b - a).cross(c - a).norm(); }
+
 double surface_area(const TriangleMesh& mesh)
 {
-    double twice = 0;
-    for (const Eigen::Vector3i& t : mesh.triangles) {
-        const Eigen::Vector3d& a = mesh.vertices[std::size_t(t[0])];
-        twice += (mesh.vertices[std::size_t(t[1])] - a).cross(mesh.vertices[std::size_t(t[2])] - a).norm();
-    }
-    return 0.5 * twice;
+    double area = 0;
+    for (const Eigen::Vector3i& t : mesh.triangles)
+        area += triangle_area(mesh.vertices[std::size_t(t[0])], mesh.vertices[std::size_t(t[1])], mesh.vertices[std::size_t(t[2])]);
+    return area;
 }
 
 double enclosed_volume(const TriangleMesh& mesh)

@@ -20,6 +20,7 @@ struct TriangleMesh {
 /// Area and volume converge with spacing^2.
 TriangleMesh extract_mesh(const DistanceGrid& grid);
 
+double triangle_area(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c);  ///< [m^2]
 double surface_area(const TriangleMesh& mesh);     ///< [m^2]
 double enclosed_volume(const TriangleMesh& mesh);  ///< by the divergence theorem, voids not counted [m^3]
 

@@ -1,5 +1,6 @@
 #include "sdf/surface_nodes.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <numeric>
 #include <random>

@@ -1,6 +1,7 @@
 #pragma once
 /// \file sh/fit.h
 /// Radial fit of spherical harmonics to a level set, and its errors.
+#include <memory>
 #include <vector>
 
 #include "sdf/distance_grid.h"

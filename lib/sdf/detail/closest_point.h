@@ -3,6 +3,7 @@
 /// Distances from lattice nodes to a surface given by foot points: nearest foot point near the surface, its number carried
 /// outwards by sweeps, then refined to the closest point of the surface itself [geometry notes, section 2, step 4].
 #include <Eigen/Core>
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <limits>
@@ -53,22 +54,24 @@ template <class Project>
 double refined_distance(const Eigen::Vector3d& x, const FootPoint& foot, double longest, const Project& project)
 {
     Eigen::Vector3d p = foot.position.cast<double>(), normal = foot.normal.cast<double>();
-    double best = (x - p).squaredNorm(), damping = 1.0;
-    for (int n = 0; n < 3; ++n) {
-        const Eigen::Vector3d r = x - p;
-        Eigen::Vector3d tangent = damping * (r - r.dot(normal) * normal);
-        const double length = tangent.norm();
+    double best = (x - p).squaredNorm(), stride = 1.0;  // stride: step per tangential residual, 1 on a flat surface
+    for (int n = 0; n < 4; ++n) {
+        const Eigen::Vector3d r = x - p, residual = r - r.dot(normal) * normal;
+        const double length = residual.norm();
         if (length < 2e-3 * longest) break;
-        if (length > longest) tangent *= longest / length;
-        Eigen::Vector3d q = p + tangent, q_normal;
+        const double step = std::min(stride * length, longest);
+        const Eigen::Vector3d direction = residual / length;
+        Eigen::Vector3d q = p + step * direction, q_normal;
         if (!project(q, q_normal)) break;
-        const double squared = (x - q).squaredNorm();
+        // What is left of the residual after the step tells the stride on this curvature (secant).
+        const Eigen::Vector3d s = x - q;
+        const double left = (s - s.dot(q_normal) * q_normal).dot(direction);
+        stride = std::clamp(length - left > 0 ? step / (length - left) : 2.0, 0.02, 4.0);
+        const double squared = s.squaredNorm();
         if (squared < best) {
             best = squared;
             p = q;
             normal = q_normal;
-        } else {
-            damping *= 0.4;
         }
     }
     return std::sqrt(best);
