@@ -91,7 +91,7 @@ double kenney_lau_ratio(const Psd& psd, double highest_f)
     double least = std::numeric_limits<double>::infinity();
     const auto visit = [&](double d) {
         const double f = passing_at(psd, d);
-        if (f > 0 && f <= highest_f) least = std::min(least, (passing_at(psd, 4 * d) - f) / f);
+        if (f > 0 && f <= highest_f * (1 + 1e-12)) least = std::min(least, (passing_at(psd, 4 * d) - f) / f);
     };
     for (const PsdPoint& p : psd) {
         visit(p.size);

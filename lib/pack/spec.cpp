@@ -85,20 +85,20 @@ void read_diameters(const ConfigTable& table, Population& p)
     }
 }
 
-void read_source(const ConfigTable& table, const std::filesystem::path& folder, Population& p)
+void read_source(const ConfigTable& table, const std::filesystem::path& folder, const std::filesystem::path& grains, Population& p)
 {
     static const std::array<std::string, 5> shapes{"sphere", "level-set", "sh", "polyhedron", "superellipsoid"};
     const std::string shape = table.choice("shape", shapes, "sphere");
     if (shape == "polyhedron" || shape == "superellipsoid")
         table.error("shape", "'" + shape + "' is not supported yet", "use sphere, level-set or sh");
     p.shape = shape == "level-set" ? ShapeKind::level_set : shape == "sh" ? ShapeKind::sh : ShapeKind::sphere;
-    const std::string file = table.string("file", "");
+    std::string file = table.string("file", "");
     if (p.shape == ShapeKind::sphere) {
         for (const char* key : {"file", "grains"})
             if (table.has(key)) table.error(key, "spheres take no " + std::string(key), "remove it, or set shape = \"level-set\"");
-        table.string("grains", "");
         return;
     }
+    if (p.shape == ShapeKind::level_set && !grains.empty()) file = std::filesystem::absolute(grains).string();
     if (file.empty())
         table.error("file", "is missing", p.shape == ShapeKind::sh ? "write file = \"grains.sh.h5\"" : "write file = \"grains.vdb\"");
     p.file = std::filesystem::path(file).is_absolute() ? std::filesystem::path(file) : folder / file;
@@ -112,13 +112,13 @@ void read_source(const ConfigTable& table, const std::filesystem::path& folder, 
     }
 }
 
-Population read_population(const ConfigTable& table, const std::filesystem::path& folder, std::size_t number)
+Population read_population(const ConfigTable& table, const std::filesystem::path& folder, const std::filesystem::path& grains, std::size_t number)
 {
     static const std::array<std::string, 2> roles{"coarse", "fine"};
     Population p;
     p.role = table.choice("role", roles) == "fine" ? Role::fine : Role::coarse;
     p.name = table.string("name", std::string(to_string(p.role)) + std::to_string(number + 1));
-    read_source(table, folder, p);
+    read_source(table, folder, grains, p);
     read_diameters(table, p);
     if (table.has("count")) p.count = table.integer("count");
     if (table.has("mass_fraction")) p.mass_fraction = table.quantity("mass_fraction", Dimension::number);
@@ -225,7 +225,7 @@ void check_together(const std::vector<ConfigTable>& tables, const ConfigTable& r
 
 }  // namespace
 
-Spec read_spec(const std::filesystem::path& file)
+Spec read_spec(const std::filesystem::path& file, const std::filesystem::path& grains)
 {
     const Config config = Config::from_file(file);
     const ConfigTable root = config.root();
@@ -238,7 +238,7 @@ Spec read_spec(const std::filesystem::path& file)
     if (spec.materials.empty()) spec.materials.push_back({});
     const auto tables = root.tables("population");
     for (std::size_t i = 0; i < tables.size(); ++i)
-        spec.populations.push_back(read_population(tables[i], file.parent_path(), i));
+        spec.populations.push_back(read_population(tables[i], file.parent_path(), grains, i));
     spec.dropping = read_dropping(root.table("dropping"));
     spec.compression = read_compression(root.table("compression"));
     spec.gravity = root.table("gravity").vector("vector", Dimension::acceleration, spec.gravity);

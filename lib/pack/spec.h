@@ -79,7 +79,8 @@ struct Spec {
 };
 
 /// Reads and checks a specification; relative paths in it are relative to its folder.
+/// \param grains  when given, takes the place of `file` in every level-set population
 /// \throws UsageError with all errors at once, one a line
-Spec read_spec(const std::filesystem::path& file);
+Spec read_spec(const std::filesystem::path& file, const std::filesystem::path& grains = {});
 
 }  // namespace coral::pack

@@ -1,0 +1,226 @@
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+
+#include "core/error.h"
+#include "core/progress.h"
+#include "core/text.h"
+#include "core/units.h"
+#include "pack/detail/phases.h"
+
+namespace coral::pack::detail {
+namespace {
+
+constexpr int steps_between_checks = 50;  ///< walls keep their velocity in between
+constexpr double servo_steps = 500;       ///< time constant of the servo, about one passage of a wave through the sample [steps]
+constexpr double deepest_overlap = 0.25;  ///< of the smaller radius; beyond it grains have lost their shape
+
+/// What the stop rules look at.
+struct State {
+    double unbalanced = 0, kinetic_ratio = 0, overlap = 0;
+};
+
+State state_of(const dem::World& world)
+{
+    const dem::Statistics s = world.statistics();
+    const dem::Energy e = world.energy();
+    const double elastic = e.elastic_normal + e.elastic_tangential;
+    return {s.unbalanced_ratio, elastic > 0 ? e.kinetic / elastic : 0, s.max_overlap};
+}
+
+void step_some(dem::World& world, double dt, double drag)
+{
+    for (int i = 0; i < steps_between_checks; ++i) {
+        world.step(dt);
+        if (i % 10 == 0) decay_velocities(world, drag, 10 * dt);
+    }
+}
+
+void check_sound(const dem::World& world, const Box& box, const State& state)
+{
+    if (state.overlap > deepest_overlap)
+        throw Error("compression", "grains are pressed into each other by " + std::to_string(int(100 * state.overlap)) + " % of their radius",
+                    "lower the pressure, raise the void ratio, or raise normal_stiffness");
+    const Eigen::Vector3d lower = box.lower(world), upper = box.upper(world);
+    for (int i = 0; i < world.body_count(); ++i)
+        if ((world.position(i).array() < lower.array()).any() || (world.position(i).array() > upper.array()).any())
+            throw Error("compression", "grain " + std::to_string(i) + " was pushed through a wall", "lower max_velocity or the pressure");
+}
+
+double axis_pressure(const dem::World& world, const Box& box, int axis)
+{
+    return 0.5 * (box.pressure(world, 2 * axis) + box.pressure(world, 2 * axis + 1));
+}
+
+/// Servo of one pair of walls: closing speed of each wall [m/s] from the missing pressure.
+/// The stiffness of the sample between the walls is that of its wall contacts in parallel, K_w, in series over L/s layers with
+/// s = sqrt(A/n) the spacing of those contacts: K = K_w s/L. Twice that keeps the servo slower than the sample.
+double servo_speed(double missing, double area, double gap, int wall_contacts, double stiffness, double dt, double limit)
+{
+    const double spacing = std::sqrt(area / std::max(wall_contacts, 1));
+    const double k = 2 * std::max(wall_contacts, 1) * stiffness * std::min(spacing / gap, 1.0);
+    return std::clamp(missing * area / (k * servo_steps * dt), -limit, limit);
+}
+
+void set_pair_speed(dem::World& world, const Box& box, int axis, double speed, bool both)
+{
+    const int low = box.first + 2 * axis, high = low + 1;
+    world.set_wall_velocity(low, both ? Eigen::Vector3d(speed * world.wall_normal(low)) : Eigen::Vector3d(Eigen::Vector3d::Zero()));
+    world.set_wall_velocity(high, speed * (both ? 1.0 : 2.0) * world.wall_normal(high));
+}
+
+void stop_walls(dem::World& world, const Box& box)
+{
+    for (int i = 0; i < 6; ++i) world.set_wall_velocity(box.first + i, Eigen::Vector3d::Zero());
+}
+
+/// Touching grains per wall of the box.
+std::array<int, 6> wall_contacts(const dem::World& world, const Box& box)
+{
+    std::array<int, 6> count{};
+    for (const dem::Contact& c : world.contacts())
+        if (const int wall = -1 - c.second - box.first; c.second < 0 && wall >= 0 && wall < 6) ++count[std::size_t(wall)];
+    return count;
+}
+
+double stiffest(const Spec& spec)
+{
+    double k = 0;
+    for (const Material& m : spec.materials) k = std::max(k, m.normal_stiffness);
+    return k;
+}
+
+double step_of(const dem::World& world, const Spec& spec) { return spec.dem_step > 0 ? spec.dem_step : world.auto_time_step(); }
+
+void set_frictions(dem::World& world, const Spec& spec, double friction)
+{
+    for (std::size_t m = 0; m < spec.materials.size(); ++m)
+        world.set_friction(int(m), friction >= 0 ? friction : spec.materials[m].friction);
+}
+
+bool to_pressure(dem::World& world, const Box& box, const Spec& spec)
+{
+    const Compression& rule = spec.compression;
+    const double dt = step_of(world, spec), start = world.time(), kn = stiffest(spec);
+    set_frictions(world, spec, rule.friction);
+    bool own_friction = rule.friction < 0;
+    Progress progress("compressing", 1);
+    while (world.time() - start < rule.time_limit) {
+        const Eigen::Vector3d size = box.upper(world) - box.lower(world);
+        const auto contacts = wall_contacts(world, box);
+        double worst = 0, mean = 0;
+        const int first_axis = rule.lateral ? 0 : 2;
+        for (int axis = first_axis; axis < 3; ++axis) {
+            // the top alone pushes against a bottom that also carries the weight
+            const double p = rule.lateral ? axis_pressure(world, box, axis) : box.pressure(world, 5);
+            const double missing = rule.pressure - p;
+            worst = std::max(worst, std::abs(missing) / rule.pressure);
+            mean += p / (3 - first_axis);
+            const int touching = std::max(contacts[std::size_t(2 * axis)], contacts[std::size_t(2 * axis + 1)]);
+            set_pair_speed(world, box, axis,
+                           servo_speed(missing, size.prod() / size[axis], size[axis], touching, kn, dt, rule.max_velocity), rule.lateral);
+        }
+        step_some(world, dt, rule.drag);
+        const State s = state_of(world);
+        check_sound(world, box, s);
+        progress.update(std::min(mean / rule.pressure, 0.99), "mean pressure " + format_quantity(std::round(mean), Dimension::pressure) +
+                                                                  ", unbalanced ratio " + to_text(std::round(1e4 * s.unbalanced) / 1e4));
+        if (!own_friction && worst < 0.1) {
+            set_frictions(world, spec, -1);
+            own_friction = true;
+        }
+        if (own_friction && worst < rule.tolerance && s.unbalanced < rule.unbalanced_ratio && s.kinetic_ratio < 10 * rule.kinetic_ratio) {
+            progress.finish();
+            return true;
+        }
+    }
+    return false;
+}
+
+bool to_void_ratio(dem::World& world, const Box& box, const Spec& spec, double apparent_volume)
+{
+    const Compression& rule = spec.compression;
+    const double dt = step_of(world, spec), start = world.time(), target = apparent_volume * (1 + rule.void_ratio);
+    const double first = (box.upper(world) - box.lower(world)).prod();
+    if (first < target)
+        throw Error("compression", "the poured sample has void ratio " + to_text(first / apparent_volume - 1) + ", below the target of " + to_text(rule.void_ratio),
+                    "raise [dropping] friction or void_ratio");
+    set_frictions(world, spec, rule.friction);
+    Progress progress("compressing", 1);
+    while (world.time() - start < rule.time_limit) {
+        const Eigen::Vector3d size = box.upper(world) - box.lower(world);
+        const double volume = size.prod(), excess = volume / target - 1;
+        if (excess < 1e-4) {
+            progress.finish();
+            return true;
+        }
+        // relative closing rate of every moving edge; the last part takes a few hundred steps
+        const double edges = rule.lateral ? 3 : 1;
+        const double rate = std::min(2 * rule.max_velocity / (rule.lateral ? size.maxCoeff() : size.z()), excess / (edges * servo_steps * dt));
+        for (int axis = rule.lateral ? 0 : 2; axis < 3; ++axis) set_pair_speed(world, box, axis, 0.5 * rate * size[axis], rule.lateral);
+        step_some(world, dt, rule.drag);
+        const State s = state_of(world);
+        check_sound(world, box, s);
+        progress.update(first > target ? std::min((first - volume) / (first - target), 0.99) : 0.99, "unbalanced ratio " + to_text(std::round(1e4 * s.unbalanced) / 1e4));
+    }
+    return false;
+}
+
+double seconds_since(std::chrono::steady_clock::time_point start)
+{
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+}  // namespace
+
+Eigen::Vector3d Box::lower(const dem::World& world) const
+{
+    return {world.wall_point(first).x(), world.wall_point(first + 2).y(), world.wall_point(first + 4).z()};
+}
+
+Eigen::Vector3d Box::upper(const dem::World& world) const
+{
+    return {world.wall_point(first + 1).x(), world.wall_point(first + 3).y(), world.wall_point(first + 5).z()};
+}
+
+double Box::pressure(const dem::World& world, int i) const
+{
+    const Eigen::Vector3d size = upper(world) - lower(world);
+    return -world.wall_force(first + i).dot(world.wall_normal(first + i)) * size[i / 2] / size.prod();
+}
+
+void compress(dem::World& world, const Box& box, const Spec& spec, double apparent_volume, PackReport& report)
+{
+    if (spec.compression.target == CompressionTarget::none) return;
+    const auto clock = std::chrono::steady_clock::now();
+    report.compressed = spec.compression.target == CompressionTarget::pressure ? to_pressure(world, box, spec)
+                                                                               : to_void_ratio(world, box, spec, apparent_volume);
+    stop_walls(world, box);
+    if (!report.compressed)
+        report.warnings.push_back("the compression ended at its time limit of " + to_text(spec.compression.time_limit) +
+                                  " s before its target was met; raise [compression] time_limit or tolerance");
+    report.compression_seconds = seconds_since(clock);
+}
+
+void relax(dem::World& world, const Spec& spec, PackReport& report)
+{
+    const auto clock = std::chrono::steady_clock::now();
+    const Compression& rule = spec.compression;
+    const double dt = step_of(world, spec), start = world.time();
+    set_frictions(world, spec, -1);
+    Progress progress("relaxing", rule.relaxation_limit);
+    report.relaxed = false;
+    while (!report.relaxed && world.time() - start < rule.relaxation_limit) {
+        step_some(world, dt, rule.drag);
+        const State s = state_of(world);
+        report.relaxed = s.unbalanced < rule.unbalanced_ratio && s.kinetic_ratio < rule.kinetic_ratio;
+        progress.update(std::min(world.time() - start, 0.99 * rule.relaxation_limit),
+                        "unbalanced ratio " + to_text(std::round(1e5 * s.unbalanced) / 1e5) + ", kinetic/elastic " + to_text(s.kinetic_ratio));
+    }
+    progress.finish();
+    if (!report.relaxed) report.warnings.push_back("the final relaxation ended at its time limit of " + to_text(rule.relaxation_limit) + " s; raise [compression] relaxation_limit");
+    report.relaxation_seconds = seconds_since(clock);
+}
+
+}  // namespace coral::pack::detail

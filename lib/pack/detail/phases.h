@@ -1,0 +1,34 @@
+#pragma once
+/// \file pack/detail/phases.h
+/// The phases of a packing (pack/pack.h), one function each.
+#include "dem/world.h"
+#include "pack/pack.h"
+#include "pack/populations.h"
+
+namespace coral::pack::detail {
+
+/// Scales all velocities by exp(-rate time): the drag that shortens settling. A split step of its own, every few steps.
+void decay_velocities(dem::World& world, double rate, double time);
+
+/// Box of the sample as planes of a world: walls `first` .. `first + 5` in the order x-, x+, y-, y+, z-, z+.
+struct Box {
+    int first = 0;
+    Eigen::Vector3d lower(const dem::World& world) const;
+    Eigen::Vector3d upper(const dem::World& world) const;
+    /// Mean normal pressure of the bodies on wall i (0..5) [Pa].
+    double pressure(const dem::World& world, int i) const;
+};
+
+/// Pours the grains: sets pose of every particle, and the smooth walls of the sample with the top one above the highest grain.
+void pour(Grains& grains, const Spec& spec, std::uint64_t seed, PackReport& report);
+
+/// Compresses to the target in a world built from the sample (bodies in its order).
+void compress(dem::World& world, const Box& box, const Spec& spec, double apparent_volume, PackReport& report);
+
+/// Comes to rest with walls that stand still.
+void relax(dem::World& world, const Spec& spec, PackReport& report);
+
+/// Poses, walls, contacts, springs, gradation, criteria and statistics of the final state; the lower corner moves to the origin.
+void measure(const dem::World& world, const Box& box, double dem_step, std::int64_t steps, Sample& sample);
+
+}  // namespace coral::pack::detail

@@ -1,0 +1,272 @@
+#include "pack/populations.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <memory>
+#include <numbers>
+#include <random>
+
+#include "core/error.h"
+#include "core/parallel.h"
+#include "core/progress.h"
+#include "core/units.h"
+#include "pack/criteria.h"
+#include "sdf/extend.h"
+#include "sdf/mass_properties.h"
+#include "sdf/surface_nodes.h"
+#include "sdf/vdb_io.h"
+#include "sh/shape_file.h"
+#include "sh/tabulate.h"
+
+namespace coral::pack {
+namespace {
+
+using Random = std::mt19937_64;
+
+double uniform(Random& random) { return double(random() >> 11) * 0x1p-53; }
+
+/// What a file tells about its grains before any is loaded.
+struct Source {
+    std::vector<std::int64_t> ids;
+    std::map<std::int64_t, double> diameter, volume;  ///< equivalent diameter [m] and solid volume [m3] at the size of the file
+    History history;
+};
+
+Source read_source(const Population& p)
+{
+    Source source;
+    if (p.shape == ShapeKind::level_set) {
+        const sdf::GrainReader reader(p.file);
+        source.history = reader.history();
+        for (const int id : reader.ids()) {
+            if (!p.grains.empty() && std::find(p.grains.begin(), p.grains.end(), id) == p.grains.end()) continue;
+            const sdf::GrainLevelSet grain = reader.read(id);
+            source.ids.push_back(id);
+            source.diameter[id] = grain.equivalent_diameter;
+            source.volume[id] = grain.volume;
+        }
+    } else {
+        const sh::ShapeFile file = sh::read_shapes(p.file);
+        source.history = file.history;
+        for (const sh::ShapeRecord& s : file.shapes) {
+            source.ids.push_back(s.id);
+            source.volume[s.id] = s.volume;
+            source.diameter[s.id] = std::cbrt(6 * s.volume / std::numbers::pi);
+        }
+    }
+    for (const std::int64_t id : p.grains)
+        if (!source.volume.contains(id)) throw UsageError(p.file.string(), "population '" + p.name + "' asks for grain " + std::to_string(id) + ", which the file does not have", "write grains = \"all\" or ids of the file's table");
+    if (!p.grains.empty()) source.ids = p.grains;
+    if (source.ids.empty()) throw Error(p.file.string(), "has no grains", "make it again with csct2ls");
+    return source;
+}
+
+/// Draws the grains of one population one after the other.
+class Drawer {
+public:
+    Drawer(const Population& population, double density, Random& random) : p_(population), density_(density), random_(random)
+    {
+        if (p_.shape != ShapeKind::sphere) source_ = read_source(p_);
+    }
+
+    struct Grain {
+        std::int64_t id;
+        double diameter, mass;
+    };
+    Grain next()
+    {
+        if (p_.shape == ShapeKind::sphere) {
+            const double d = diameter();
+            return {0, d, density_ * std::numbers::pi / 6 * d * d * d};
+        }
+        if (deck_.empty()) {
+            deck_ = source_.ids;
+            for (std::size_t i = deck_.size() - 1; i > 0; --i) std::swap(deck_[i], deck_[std::size_t(uniform(random_) * double(i + 1))]);
+        }
+        const std::int64_t id = deck_.back();
+        deck_.pop_back();
+        const double own = source_.diameter.at(id), d = p_.own_size ? own : diameter();
+        return {id, d, density_ * source_.volume.at(id) * std::pow(d / own, 3)};
+    }
+    const Source& source() const { return source_; }
+
+private:
+    double diameter()
+    {
+        if (p_.gradation == Gradation::single) return p_.smallest;
+        if (p_.gradation == Gradation::uniform) return p_.smallest + (p_.largest - p_.smallest) * uniform(random_);
+        // the table is by mass: a size drawn by mass is kept with the number of grains that share the mass, that is with 1/d^3
+        for (;;) {
+            const double d = size_at(p_.psd, uniform(random_));
+            if (uniform(random_) < std::pow(p_.smallest / d, 3)) return d;
+        }
+    }
+    const Population& p_;
+    double density_;
+    Random& random_;
+    Source source_;
+    std::vector<std::int64_t> deck_;
+};
+
+using Drawn = std::vector<Drawer::Grain>;
+
+double total_mass(const Drawn& grains)
+{
+    double sum = 0;
+    for (const auto& g : grains) sum += g.mass;
+    return sum;
+}
+
+Drawn draw_mass(Drawer& drawer, double target, const Population& p)
+{
+    Drawn grains;
+    double sum = 0;
+    while (sum < target) {
+        if (grains.size() > 5'000'000) throw UsageError("population '" + p.name + "'", "its mass fraction takes more than five million grains", "enlarge its diameters");
+        grains.push_back(drawer.next());
+        sum += grains.back().mass;
+    }
+    if (grains.size() > 1 && sum - target > 0.5 * grains.back().mass) grains.pop_back();
+    return grains;
+}
+
+std::vector<Drawn> draw_all(const Spec& spec, std::vector<Drawer>& drawers)
+{
+    std::vector<Drawn> drawn(spec.populations.size());
+    double counted = 0, fractions = 0;
+    for (std::size_t i = 0; i < drawn.size(); ++i) {
+        const Population& p = spec.populations[i];
+        fractions += p.mass_fraction.value_or(0);
+        for (std::int64_t n = 0; n < p.count.value_or(0); ++n) drawn[i].push_back(drawers[i].next());
+        counted += total_mass(drawn[i]);
+    }
+    for (std::size_t i = 0; i < drawn.size(); ++i)
+        if (const auto share = spec.populations[i].mass_fraction)
+            drawn[i] = draw_mass(drawers[i], *share * counted / (1 - fractions), spec.populations[i]);
+    return drawn;
+}
+
+int material_index(const Spec& spec, const std::string& name)
+{
+    for (std::size_t i = 0; i < spec.materials.size(); ++i)
+        if (spec.materials[i].name == name) return int(i);
+    return 0;
+}
+
+/// Steps of several files, each kept once (populations often share a file).
+void join_history(History& all, const History& more)
+{
+    const std::string text = to_json(more);
+    if (to_json(all).find(text.substr(1, text.size() - 2)) == std::string::npos) all.insert(all.end(), more.begin(), more.end());
+}
+
+void check_room(const Spec& spec, const Grains& grains)
+{
+    double apparent = 0;
+    for (const Particle& p : grains.sample.particles) apparent += apparent_volume(grains.sample, p);
+    const double box = spec.size.prod();
+    if (apparent > 0.74 * box)
+        throw UsageError("[box] size", "the grains fill " + std::to_string(int(100 * apparent / box)) + " % of the box, no packing holds more than 74 %",
+                         "enlarge the box or take fewer grains");
+    for (std::size_t i = 0; i < grains.sample.particles.size(); ++i) {
+        const Particle& p = grains.sample.particles[i];
+        const double d = equivalent_diameter(grains.sample, p), base = spec.size.head<2>().minCoeff();
+        if (d >= base) throw UsageError("population '" + spec.populations[std::size_t(grains.population[i])].name + "'",
+                                        "a grain of " + format_quantity(d, Dimension::length) + " does not fit the base of the box, " + format_quantity(base, Dimension::length), "enlarge [box] size");
+    }
+}
+
+}  // namespace
+
+ShapeTemplate load_shape(const Population& p, std::int64_t id, double reach)
+{
+    ShapeTemplate shape;
+    shape.kind = p.shape;
+    shape.name = p.file.filename().string() + (p.shape == ShapeKind::sh ? " shape " : " grain_") + std::to_string(id);
+    if (p.shape == ShapeKind::level_set) {
+        sdf::GrainLevelSet grain = sdf::GrainReader(p.file).read(int(id));
+        shape.grid = std::make_shared<sdf::DistanceGrid>(sdf::extended(grain.solid, reach));
+        shape.apparent_grid = std::make_shared<sdf::DistanceGrid>(std::move(grain.apparent));
+        shape.volume = grain.volume;
+        shape.apparent_volume = grain.apparent_volume;
+        shape.equivalent_diameter = grain.equivalent_diameter;
+        shape.inertia = grain.inertia;
+    } else {
+        const sh::ShapeFile file = sh::read_shapes(p.file);
+        const auto found = std::find_if(file.shapes.begin(), file.shapes.end(), [&](const sh::ShapeRecord& s) { return s.id == id; });
+        if (found == file.shapes.end()) throw UsageError(p.file.string(), "has no shape " + std::to_string(id), "");
+        const sh::Surface surface = sh::centred(found->surface);
+        const sh::BodyProperties body = sh::body_properties(surface);
+        shape.volume = shape.apparent_volume = body.volume;
+        shape.equivalent_diameter = std::cbrt(6 * body.volume / std::numbers::pi);
+        shape.inertia = body.inertia;
+        shape.grid = std::make_shared<sdf::DistanceGrid>(
+            sh::tabulate(surface, p.grid_spacing > 0 ? p.grid_spacing : shape.equivalent_diameter / 60, reach));
+        shape.degree = surface.degree;
+        shape.coefficients = surface.coefficients;
+    }
+    sdf::SurfaceNodes nodes = sdf::surface_nodes(*shape.grid, p.surface_nodes);
+    shape.nodes = std::move(nodes.positions);
+    shape.node_areas = std::move(nodes.areas);
+    return shape;
+}
+
+Grains make_grains(const Spec& spec, std::uint64_t seed)
+{
+    Random random(seed);
+    Grains grains;
+    Sample& sample = grains.sample;
+    sample.materials = spec.materials;
+    sample.gravity = spec.gravity;
+    std::vector<Drawer> drawers;
+    for (const Population& p : spec.populations)
+        drawers.emplace_back(p, spec.materials[std::size_t(material_index(spec, p.material))].density, random);
+    const std::vector<Drawn> drawn = draw_all(spec, drawers);
+
+    // one template per population and id; the unit sphere is shared by all
+    struct Wanted {
+        std::size_t population;
+        std::int64_t id;
+        double smallest_scale;
+    };
+    std::vector<Wanted> wanted;
+    std::map<std::pair<std::size_t, std::int64_t>, int> index;
+    double largest_sphere = 0;
+    for (std::size_t i = 0; i < drawn.size(); ++i) {
+        const Population& p = spec.populations[i];
+        const bool sphere = p.shape == ShapeKind::sphere;
+        if (!sphere) join_history(sample.history, drawers[i].source().history);
+        for (const auto& g : drawn[i]) {
+            const auto key = sphere ? std::pair<std::size_t, std::int64_t>{std::size_t(-1), 0} : std::pair{i, g.id};
+            const double scale = sphere ? g.diameter : g.diameter / drawers[i].source().diameter.at(g.id);
+            const auto [at, added] = index.try_emplace(key, int(wanted.size()));
+            if (added) wanted.push_back({i, g.id, scale});
+            if (sphere) largest_sphere = std::max(largest_sphere, 0.5 * g.diameter);
+            Wanted& w = wanted[std::size_t(at->second)];
+            w.smallest_scale = std::min(w.smallest_scale, scale);
+            Particle particle;
+            particle.shape = at->second;
+            particle.scale = scale;
+            particle.role = p.role;
+            particle.material = material_index(spec, p.material);
+            sample.particles.push_back(particle);
+            grains.population.push_back(int(i));
+        }
+    }
+    sample.shapes.resize(wanted.size());
+    Progress progress("loading shapes", double(wanted.size()));
+    std::size_t done = 0;
+    for (std::size_t k = 0; k < wanted.size(); ++k) {
+        const Population& p = spec.populations[wanted[k].population];
+        // lists see spheres a skin (half a radius is ample) before they touch
+        const double reach = 1.5 * largest_sphere / wanted[k].smallest_scale;
+        sample.shapes[k] = p.shape == ShapeKind::sphere ? unit_sphere() : load_shape(p, wanted[k].id, reach);
+        progress.update(double(++done));
+    }
+    progress.finish();
+    check_room(spec, grains);
+    return grains;
+}
+
+}  // namespace coral::pack

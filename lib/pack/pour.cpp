@@ -1,0 +1,215 @@
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <functional>
+#include <numbers>
+#include <random>
+
+#include "core/error.h"
+#include "core/progress.h"
+#include "core/text.h"
+#include "pack/detail/phases.h"
+#include "pack/sample_world.h"
+
+namespace coral::pack::detail {
+namespace {
+
+using Random = std::mt19937_64;
+using Batch = std::vector<int>;  ///< particles dropped together
+
+double uniform(Random& random) { return double(random() >> 11) * 0x1p-53; }
+
+/// Evenly distributed rotation [Shoemake 1992].
+Eigen::Quaterniond random_rotation(Random& random)
+{
+    const double u = uniform(random), v = 2 * std::numbers::pi * uniform(random), w = 2 * std::numbers::pi * uniform(random);
+    const double a = std::sqrt(1 - u), b = std::sqrt(u);
+    return {b * std::cos(w), a * std::sin(v), a * std::cos(v), b * std::sin(w)};
+}
+
+void shuffle(std::vector<int>& items, Random& random)
+{
+    for (std::size_t i = items.size(); i > 1; --i) std::swap(items[i - 1], items[std::size_t(uniform(random) * double(i))]);
+}
+
+double bounding_radius(const std::vector<std::shared_ptr<const dem::Shape>>& shapes, const Particle& p)
+{
+    return shapes[std::size_t(p.shape)]->bounding_radius() * p.scale;
+}
+
+/// Number of layers that keeps each coarse batch to about one layer of grains; without coarse grains, a few diameters of fines.
+int layer_count(const Sample& sample, const std::vector<int>& coarse, const std::vector<double>& radius, double base_area)
+{
+    double area = 0;
+    const auto cover = [&](int i) { return 4 * radius[std::size_t(i)] * radius[std::size_t(i)]; };
+    if (!coarse.empty()) {
+        for (const int i : coarse) area += cover(i);
+        return std::clamp(int(std::ceil(area / (0.8 * base_area))), 1, int(coarse.size()));
+    }
+    for (std::size_t i = 0; i < sample.particles.size(); ++i) area += cover(int(i));
+    return std::max(1, int(std::ceil(area / (4 * base_area))));
+}
+
+/// Coarse and fine batches in turn; each role is shuffled so that every batch has its share of all populations.
+std::vector<Batch> make_batches(const Sample& sample, const std::vector<double>& radius, const Spec& spec, Random& random)
+{
+    std::vector<int> coarse, fine;
+    for (std::size_t i = 0; i < sample.particles.size(); ++i)
+        (sample.particles[i].role == Role::coarse ? coarse : fine).push_back(int(i));
+    shuffle(coarse, random);
+    shuffle(fine, random);
+    const int layers = spec.dropping.layers > 0 ? spec.dropping.layers : layer_count(sample, coarse, radius, spec.size.x() * spec.size.y());
+    std::vector<Batch> batches;
+    for (int layer = 0; layer < layers; ++layer)
+        for (const auto* role : {&coarse, &fine}) {
+            const auto share = [&](int part) { return role->begin() + std::ptrdiff_t(role->size()) * part / layers; };
+            if (share(layer) != share(layer + 1)) batches.emplace_back(share(layer), share(layer + 1));
+        }
+    return batches;
+}
+
+/// Places a batch at random above `floor` without overlap of bounding spheres, in a slab as thin as the grains allow.
+void place(const Batch& batch, Sample& sample, const std::vector<double>& radius, const Spec& spec, double floor, Random& random)
+{
+    double volume = 0;
+    for (const int i : batch) volume += 8 * std::pow(radius[std::size_t(i)], 3);
+    double thickness = volume / (0.4 * spec.size.x() * spec.size.y());
+    for (std::size_t n = 0; n < batch.size(); ++n) {
+        Particle& p = sample.particles[std::size_t(batch[n])];
+        const double r = radius[std::size_t(batch[n])];
+        const Eigen::Array2d room = (spec.size.head<2>().array() - 2 * r).max(0.0);
+        if (2 * r > spec.size.head<2>().minCoeff())
+            throw UsageError("[box] size", "a grain of bounding diameter " + to_text(2 * r) + " m does not fit between the walls", "enlarge the base of the box");
+        p.orientation = random_rotation(random);
+        for (int attempt = 1;; ++attempt) {
+            const double x = uniform(random), y = uniform(random), z = uniform(random);
+            p.position = {r + x * room.x(), r + y * room.y(), floor + r + z * std::max(thickness - 2 * r, 0.0)};
+            const bool free = std::all_of(batch.begin(), batch.begin() + std::ptrdiff_t(n), [&](int other) {
+                const double reach = r + radius[std::size_t(other)];
+                return (sample.particles[std::size_t(other)].position - p.position).squaredNorm() > reach * reach;
+            });
+            if (free) break;
+            if (attempt % 200 == 0) thickness *= 1.05;
+        }
+    }
+}
+
+/// World of the pouring: softened contacts, smooth walls, no lid.
+dem::World soft_world(const Sample& sample, const Spec& spec, const std::vector<std::shared_ptr<const dem::Shape>>& shapes)
+{
+    dem::WorldOptions options;
+    options.gravity = spec.gravity;
+    options.step_fraction = 0.5;
+    dem::World world(options);
+    for (const auto& shape : shapes) world.add_shape(shape);
+    for (Material m : sample.materials) {
+        m.normal_stiffness *= spec.dropping.stiffness_factor;
+        m.tangential_stiffness *= spec.dropping.stiffness_factor;
+        m.friction = std::min(m.friction, spec.dropping.friction);
+        m.damping = spec.dropping.damping;
+        world.add_material(m);
+    }
+    Material smooth = world.material(0);
+    smooth.name = "wall";
+    smooth.friction = 0;
+    const int wall = world.add_material(smooth);
+    world.add_plane({0, 0, 0}, Eigen::Vector3d::UnitX(), wall);
+    world.add_plane({spec.size.x(), 0, 0}, -Eigen::Vector3d::UnitX(), wall);
+    world.add_plane({0, 0, 0}, Eigen::Vector3d::UnitY(), wall);
+    world.add_plane({0, spec.size.y(), 0}, -Eigen::Vector3d::UnitY(), wall);
+    world.add_plane({0, 0, 0}, Eigen::Vector3d::UnitZ(), wall);
+    return world;
+}
+
+double highest_point(const dem::World& world)
+{
+    double top = 0;
+    for (int i = 0; i < world.body_count(); ++i) top = std::max(top, world.position(i).z() + world.bounding_radius(i));
+    return top;
+}
+
+double mean_speed(const dem::World& world)
+{
+    double sum = 0;
+    for (const auto& v : world.velocities()) sum += v.norm();
+    return world.body_count() > 0 ? sum / world.body_count() : 0;
+}
+
+/// Steps until the stop rule holds or the time is up. Returns whether it held.
+bool settle(dem::World& world, const Dropping& rule, double speed_limit, const std::function<void(double, double)>& tell)
+{
+    constexpr int batch_of_steps = 100, decay_every = 10;
+    const double dt = world.auto_time_step(), start = world.time();
+    while (world.time() - start < rule.time_limit) {
+        for (int i = 0; i < batch_of_steps; ++i) {
+            world.step(dt);
+            if (i % decay_every == 0) decay_velocities(world, rule.drag, decay_every * dt);
+        }
+        const dem::Statistics s = world.statistics();
+        tell(world.time() - start, s.unbalanced_ratio);
+        if (s.contacts > 0 && s.unbalanced_ratio < rule.unbalanced_ratio && mean_speed(world) < speed_limit) return true;
+    }
+    return false;
+}
+
+}  // namespace
+
+void decay_velocities(dem::World& world, double rate, double time)
+{
+    if (rate <= 0) return;
+    const double factor = std::exp(-rate * time);
+    for (int i = 0; i < world.body_count(); ++i) world.set_velocity(i, factor * world.velocity(i), factor * world.angular_velocity(i));
+}
+
+void pour(Grains& grains, const Spec& spec, std::uint64_t seed, PackReport& report)
+{
+    const auto clock = std::chrono::steady_clock::now();
+    Sample& sample = grains.sample;
+    Random random(seed ^ 0x706f7572ULL);  // another stream than that of the drawing
+    std::vector<std::shared_ptr<const dem::Shape>> shapes;
+    for (const ShapeTemplate& s : sample.shapes) shapes.push_back(make_shape(s));
+    std::vector<double> radius;
+    double smallest = 1e300;
+    for (const Particle& p : sample.particles) {
+        radius.push_back(bounding_radius(shapes, p));
+        smallest = std::min(smallest, equivalent_diameter(sample, p));
+    }
+    const std::vector<Batch> batches = make_batches(sample, radius, spec, random);
+    dem::World world = soft_world(sample, spec, shapes);
+    std::vector<int> particle_of_body;
+    Progress progress("pouring", double(batches.size()));
+    for (std::size_t b = 0; b < batches.size(); ++b) {
+        place(batches[b], sample, radius, spec, highest_point(world) + spec.dropping.drop_height, random);
+        for (const int i : batches[b]) {
+            const Particle& p = sample.particles[std::size_t(i)];
+            dem::BodySpec body;
+            body.shape = p.shape;
+            body.material = p.material;
+            body.scale = p.scale;
+            body.role = to_string(p.role);
+            body.position = p.position;
+            body.orientation = p.orientation;
+            world.add_body(body);
+            particle_of_body.push_back(i);
+        }
+        const double limit = spec.dropping.speed_ratio * std::sqrt(spec.gravity.norm() * smallest);
+        const bool settled = settle(world, spec.dropping, limit, [&](double time, double unbalanced) {
+            progress.update(double(b) + std::min(time / spec.dropping.time_limit, 0.99),
+                            "layer " + std::to_string(b + 1) + " of " + std::to_string(batches.size()) + ", unbalanced ratio " + to_text(std::round(1e4 * unbalanced) / 1e4));
+        });
+        report.unsettled_layers += !settled;
+    }
+    progress.finish();
+    for (std::size_t i = 0; i < particle_of_body.size(); ++i) {
+        Particle& p = sample.particles[std::size_t(particle_of_body[i])];
+        p.position = world.position(int(i));
+        p.orientation = world.orientation(int(i));
+    }
+    sample.size = {spec.size.x(), spec.size.y(), highest_point(world)};
+    report.layers = int(batches.size());
+    report.steps += world.counters().steps;
+    report.simulated_time += world.time();
+    report.pouring_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - clock).count();
+}
+
+}  // namespace coral::pack::detail

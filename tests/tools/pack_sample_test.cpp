@@ -1,0 +1,62 @@
+// pack-sample as a user runs it: a small sphere packing, its summary, and what it says about bad input.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "tools/run_program.h"
+
+namespace coral::test {
+namespace {
+
+const std::string spec =
+    "[box]\nsize = [\"8mm\", \"8mm\", \"12mm\"]\n"
+    "[[population]]\nrole = \"coarse\"\ndiameter = \"3mm\"\ncount = 8\n"
+    "[[population]]\nrole = \"fine\"\ndiameter = \"1mm\"\nmass_fraction = 0.3\n"
+    "[material.default]\nnormal_stiffness = 2e4\ntangential_stiffness = 1e4\nfriction = 0.3\n"
+    "[dropping]\ntime_limit = \"30ms\"\n[compression]\npressure = \"5kPa\"\n";
+
+TEST(PackSample, writes_a_sample_and_its_figures_as_json)
+{
+    const ScratchFolder folder;
+    write_text(folder.path() / "spec.toml", spec);
+    const ProgramResult result = run_program("pack-sample spec.toml -o sample.h5 --json --quiet --seed 3", folder.path());
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_TRUE(std::filesystem::exists(folder.path() / "sample.h5"));
+    for (const char* key : {"\"porosity\":", "\"fines_content\":", "\"coordination\":", "\"kezdi\":", "\"kenney-lau\":", "\"mao\":",
+                            "\"unbalanced_ratio\":", "\"kinetic_ratio\":", "\"wall_pressure\":", "\"coarse\": 8"})
+        EXPECT_NE(result.out.find(key), std::string::npos) << key << " is missing in " << result.out;
+}
+
+TEST(PackSample, reports_every_wrong_key_of_a_specification_and_ends_with_2)
+{
+    const ScratchFolder folder;
+    write_text(folder.path() / "spec.toml", "[box]\nsize = [\"8mm\", \"8mm\", \"12kg\"]\n[[population]]\nrole = \"coarse\"\ndiametre = \"3mm\"\ncount = 8\n");
+    const ProgramResult result = run_program("pack-sample spec.toml -o sample.h5", folder.path());
+    EXPECT_EQ(result.exit_code, 2);
+    EXPECT_NE(result.err.find("spec.toml:2:"), std::string::npos) << result.err;
+    EXPECT_NE(result.err.find("did you mean 'diameter'"), std::string::npos) << result.err;
+    EXPECT_FALSE(std::filesystem::exists(folder.path() / "sample.h5"));
+}
+
+TEST(PackSample, ends_with_1_on_a_damaged_grain_file)
+{
+    const ScratchFolder folder;
+    write_text(folder.path() / "grains.vdb", "this is no level set");
+    write_text(folder.path() / "spec.toml", "[box]\nsize = [0.02, 0.02, 0.02]\n[[population]]\nrole = \"coarse\"\nshape = \"level-set\"\nfile = \"grains.vdb\"\ncount = 2\n");
+    const ProgramResult result = run_program("pack-sample spec.toml -o sample.h5", folder.path());
+    EXPECT_EQ(result.exit_code, 1) << result.err;
+    EXPECT_NE(result.err.find("grains.vdb"), std::string::npos) << result.err;
+}
+
+TEST(PackSample, ends_with_2_when_the_specification_or_the_output_folder_is_missing)
+{
+    const ScratchFolder folder;
+    EXPECT_EQ(run_program("pack-sample none.toml -o sample.h5", folder.path()).exit_code, 2);
+    write_text(folder.path() / "spec.toml", spec);
+    const ProgramResult result = run_program("pack-sample spec.toml -o none/sample.h5", folder.path());
+    EXPECT_EQ(result.exit_code, 2);
+    EXPECT_NE(result.err.find("folder does not exist"), std::string::npos) << result.err;
+}
+
+}  // namespace
+}  // namespace coral::test

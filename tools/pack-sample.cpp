@@ -1,0 +1,122 @@
+// pack-sample: specification of a packing -> sample.h5, a settled and compressed gap-graded sample.
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <cmath>
+#include <filesystem>
+
+#include "cli.h"
+#include "core/error.h"
+#include "core/output_file.h"
+#include "pack/pack.h"
+
+using namespace coral;
+
+namespace {
+
+struct Options {
+    std::filesystem::path input, output, grains;
+};
+
+void declare(CLI::App& app, Options& o)
+{
+    app.add_option("input", o.input, "Specification of the packing, .toml (keys: docs/pack-spec.md)")->required();
+    app.add_option("-o,--output", o.output, "Sample, .h5")->required();
+    app.add_option("--grains", o.grains, "Level-set grains, .vdb, in place of the files that the specification names")->check(CLI::ExistingFile);
+}
+
+/// JSON has no NaN: what does not exist is null.
+nlohmann::ordered_json number(double value) { return std::isfinite(value) ? nlohmann::ordered_json(value) : nlohmann::ordered_json(nullptr); }
+
+nlohmann::ordered_json to_json(const pack::Sample& sample, const pack::PackReport& report)
+{
+    const pack::Statistics& s = sample.statistics;
+    nlohmann::ordered_json json;
+    json["particles"] = sample.particles.size();
+    std::size_t fines = 0;
+    for (const auto& p : sample.particles) fines += p.role == pack::Role::fine;
+    json["coarse"] = sample.particles.size() - fines;
+    json["fine"] = fines;
+    json["size"] = {sample.size.x(), sample.size.y(), sample.size.z()};
+    json["porosity"] = s.porosity;
+    json["interparticle_porosity"] = s.interparticle_porosity;
+    json["void_ratio"] = s.void_ratio;
+    json["interparticle_void_ratio"] = s.interparticle_void_ratio;
+    json["fines_content"] = s.fines_content;
+    json["gap_ratio"] = number(s.gap_ratio);
+    json["coordination"] = s.coordination;
+    json["coordination_coarse_coarse"] = number(s.coordination_coarse_coarse);
+    json["coordination_coarse_fine"] = number(s.coordination_coarse_fine);
+    json["coordination_fine_coarse"] = number(s.coordination_fine_coarse);
+    json["coordination_fine_fine"] = number(s.coordination_fine_fine);
+    json["rattler_fraction"] = s.rattler_fraction;
+    json["kinetic_ratio"] = s.kinetic_ratio;
+    json["unbalanced_ratio"] = s.unbalanced_ratio;
+    json["mean_pressure"] = s.mean_pressure;
+    json["max_overlap"] = s.max_overlap;
+    for (const auto& w : sample.walls) json["wall_pressure"][w.name] = w.pressure;
+    for (const auto& c : sample.criteria)
+        json["criteria"][c.name] = {{"value", number(c.value)}, {"threshold", c.threshold}, {"verdict", c.verdict}};
+    json["compressed"] = report.compressed;
+    json["relaxed"] = report.relaxed;
+    json["steps"] = report.steps;
+    json["dem_step"] = s.dem_step;
+    json["simulated_time"] = report.simulated_time;
+    json["seconds"] = {{"loading", report.loading_seconds}, {"pouring", report.pouring_seconds},
+                       {"compression", report.compression_seconds}, {"relaxation", report.relaxation_seconds}};
+    json["warnings"] = report.warnings;
+    return json;
+}
+
+std::string to_text(const pack::Sample& sample, const pack::PackReport& report, const std::filesystem::path& output)
+{
+    const pack::Statistics& s = sample.statistics;
+    std::size_t fines = 0;
+    for (const auto& p : sample.particles) fines += p.role == pack::Role::fine;
+    std::string text = fmt::format("{}: {} coarse and {} fine grains in {} x {} x {}\n", output.filename().string(), sample.particles.size() - fines,
+                                   fines, format_quantity(sample.size.x(), Dimension::length), format_quantity(sample.size.y(), Dimension::length),
+                                   format_quantity(sample.size.z(), Dimension::length));
+    const auto line = [&](const char* name, const std::string& value) { text += fmt::format("  {:32} {}\n", name, value); };
+    line("porosity", fmt::format("{:.4f} with intraparticle voids, {:.4f} without", s.porosity, s.interparticle_porosity));
+    line("void ratio", fmt::format("{:.4f} with intraparticle voids, {:.4f} without", s.void_ratio, s.interparticle_void_ratio));
+    line("fines content by mass", fmt::format("{:.4f}, gap ratio {:.2f}", s.fines_content, s.gap_ratio));
+    line("coordination number", fmt::format("{:.2f} (coarse-coarse {:.2f}, coarse-fine {:.2f}, fine-coarse {:.2f}, fine-fine {:.2f})", s.coordination,
+                                            s.coordination_coarse_coarse, s.coordination_coarse_fine, s.coordination_fine_coarse, s.coordination_fine_fine));
+    line("grains with under two contacts", fmt::format("{:.1f} %", 100 * s.rattler_fraction));
+    line("mean pressure on the walls", format_quantity(s.mean_pressure, Dimension::pressure));
+    for (const auto& w : sample.walls) line("", fmt::format("{}  {}", w.name, format_quantity(w.pressure, Dimension::pressure)));
+    line("unbalanced-force ratio", fmt::format("{:.2e}", s.unbalanced_ratio));
+    line("kinetic over elastic energy", fmt::format("{:.2e}", s.kinetic_ratio));
+    line("largest overlap over diameter", fmt::format("{:.2e} between grains, {:.2e} at walls", s.max_overlap, s.max_wall_overlap));
+    for (const auto& c : sample.criteria) line(c.name.c_str(), fmt::format("{:.3f}  {}: {}", c.value, c.verdict, c.definition));
+    line("time", fmt::format("{} steps, {:.2f} s simulated; {:.1f} s loading, {:.1f} s pouring, {:.1f} s compressing, {:.1f} s relaxing", report.steps,
+                             report.simulated_time, report.loading_seconds, report.pouring_seconds, report.compression_seconds, report.relaxation_seconds));
+    return text;
+}
+
+void run(const Options& o, const cli::Context& context, std::uint64_t seed)
+{
+    const pack::Spec spec = pack::read_spec(o.input, o.grains);
+    if (!std::filesystem::is_directory(o.output.has_parent_path() ? o.output.parent_path() : "."))
+        throw UsageError(o.output.string(), "its folder does not exist", "make the folder first");
+    pack::PackReport report;
+    pack::Sample sample = pack::pack(spec, seed, report);
+    RecordEntry entry = context.record;
+    if (!o.grains.empty()) entry.options["grains"] = o.grains.filename().string();  // no folders in a history
+    entry.options["specification"] = read_text_file(o.input);  // a file name alone would not repeat the run
+    sample.history.push_back(std::move(entry));
+    pack::write_sample(sample, o.output);
+    for (const std::string& warning : report.warnings) spdlog::warn("{}", warning);
+    cli::print_summary(context, to_json(sample, report), to_text(sample, report, o.output));
+}
+
+}  // namespace
+
+int main(int argc, char** argv)
+{
+    Options options;
+    std::uint64_t seed = 1;
+    return cli::run_tool(
+        argc, argv, "pack-sample", "Pour, compress and relax grains to a gap-graded sample", [&](CLI::App& app) { declare(app, options); },
+        [&](const cli::Context& context) { run(options, context, seed); }, &seed);
+}
