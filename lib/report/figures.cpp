@@ -272,7 +272,7 @@ std::vector<Figure> make_figures(const std::vector<CaseData>& cases)
 {
     std::vector<Figure> figures;
     for (const TimeFigure& spec : time_figures()) figures.push_back(make_time_figure(spec, cases));
-    figures.insert(figures.begin() + 2, make_layer_bars(cases));
+    figures.insert(figures.begin() + 1, make_layer_bars(cases));
     figures.push_back(make_migration(cases));
     figures.push_back(make_top_layer(cases));
     figures.push_back(make_speeds(cases));

@@ -171,29 +171,29 @@ std::string gnuplot_script(const Figure& figure)
 {
     const std::size_t panels = figure.panels.size();
     const bool wide = panels > 1;
-    const std::size_t width = wide ? 420 * panels : 800, height = wide ? 430 : 480;
+    const std::size_t width = wide ? 400 * panels : 600, height = wide ? 420 : 410;
     std::string text = "# " + figure.title + ". Redraw with: gnuplot " + figure.name + ".gp\n" +
                        "# erosion-report writes this file anew each time; copy the folder to restyle figures for a journal.\n"
                        "data = " + quoted(figure.name + ".csv") + "  # ";
     for (std::size_t c = 0; c < figure.table.columns.size(); ++c) text += (c ? ", " : "") + std::to_string(c + 1) + " " + figure.table.columns[c];
     text += "\nset datafile separator comma\nset encoding utf8\nset key noenhanced\n"
             "set border 3 lc rgb '#444444'; set tics nomirror tc rgb '#222222'; set grid lc rgb '#DDDDDD' lt 1\n"
-            "set key below center horizontal spacing 1.3 samplen 3\n"
+            "set key below center horizontal Left reverse spacing 1.3 samplen 2.5\n"
             "png = strstrt(GPVAL_TERMINALS, 'pngcairo') ? 'pngcairo' : 'png'\n"
             "do for [kind in 'svg png'] {\n";
     const std::string size = std::to_string(width) + "," + std::to_string(height);
-    const std::string large = std::to_string(2 * width) + "," + std::to_string(2 * height);
-    text += "  if (kind eq 'svg') { set terminal svg size " + size + " dynamic font 'sans-serif,14' background '#FFFFFF' }\n"
-            "  if (kind eq 'png' && png eq 'pngcairo') { set terminal pngcairo size " + large + " font 'sans-serif,11' fontscale 2 linewidth 2 pointscale 2 background '#FFFFFF' }\n"
+    const std::string large = std::to_string(5 * width / 2) + "," + std::to_string(5 * height / 2);
+    text += "  if (kind eq 'svg') { set terminal svg size " + size + " dynamic font 'sans-serif,13' background '#FFFFFF' }\n"
+            "  if (kind eq 'png' && png eq 'pngcairo') { set terminal pngcairo size " + large + " font 'sans-serif,10' fontscale 2.5 linewidth 2.5 pointscale 2.5 background '#FFFFFF' }\n"
             "  if (kind eq 'png' && png eq 'png') { set terminal png size " + large + " large linewidth 2 }\n"
             "  set output " + quoted(figure.name + ".") + ".kind\n";
-    if (wide) text += "  set multiplot layout 1," + std::to_string(panels) + " title " + quoted(figure.title) + " noenhanced font ',17'\n";
+    if (wide) text += "  set multiplot layout 1," + std::to_string(panels) + " title " + quoted(figure.title) + " noenhanced font ',15'\n";
     if (figure.x_logarithmic) text += "  set logscale x\n";
-    text += "  set xlabel " + quoted(figure.x_label) + " noenhanced\n";
+    text += "  set xlabel " + quoted(figure.x_label) + " noenhanced offset 0,0.4\n";
     for (const Panel& panel : figure.panels) {
         bool logarithmic = false;
         const std::string& title = wide ? panel.title : figure.title;
-        text += "  set title " + quoted(title) + " noenhanced" + (wide ? "" : " font ',17'") + "\n  set ylabel " + quoted(panel.y_label) + " noenhanced\n" +
+        text += "  set title " + quoted(title) + " noenhanced" + (wide ? "" : " font ',15'") + "\n  set ylabel " + quoted(panel.y_label) + " noenhanced\n" +
                 y_axis(figure, panel, logarithmic);
         text += figure.kind == FigureKind::bars ? plot_bars(figure) : plot_curves(figure, panel, logarithmic);
     }

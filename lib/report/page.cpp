@@ -283,7 +283,8 @@ std::string report_page(const std::vector<CaseData>& cases, const std::vector<Fi
                        "<a href=\"#curves-section\">Curves</a><a href=\"#view\">3-D</a></nav>\n";
     page += verdict_section(cases) + data_link(cases) + figures_section(figures, figures_folder) + key_figures(cases) + setup_section(cases) + criteria_section(cases) +
             balance_section(cases) + performance_section(cases) + history_section(cases, options.record);
-    page += curves_section(figures, options.libraries, notes) + scene_section(cases, options.libraries, notes);
+    page += curves_section(figures, options.libraries, notes);
+    page += scene_section(cases, options.libraries, notes);
     page += "<details class=\"soft\"><summary>Licences of the scripts in this page</summary><p>dygraphs: Copyright (c) Dan Vanderkam and contributors. three.js: "
             "Copyright (c) three.js authors. Both under the MIT licence: " + html(mit_licence) + "</p></details>\n";
     return page + "</body></html>\n";

@@ -97,13 +97,13 @@
             made.root.add(grain);
             made.grains.push(grain);
         });
-        var ball = new THREE.SphereBufferGeometry(1, 14, 10);
         for (var group = 0; group < 4; ++group) {
             var members = [];
             scene.sphere_group.forEach(function (of, s) { if (of === group) members.push(s); });
             if (members.length === 0) continue;
             var material = new THREE.MeshLambertMaterial({ color: layers[group], clippingPlanes: [clip] });
-            var instances = new THREE.InstancedMesh(ball, material, members.length);
+            // A geometry of its own: r111 keeps the matrices of the last group bound where two groups share one.
+            var instances = new THREE.InstancedMesh(new THREE.SphereBufferGeometry(1, 14, 10), material, members.length);
             instances.frustumCulled = false;
             made.root.add(instances);
             made.groups.push({ members: members, mesh: instances });
