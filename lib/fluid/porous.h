@@ -60,40 +60,59 @@ public:
     const Field& void_fraction() const { return void_fraction_; }
     /// Blocks of cells used for the felt averages, and stored weights (for the performance report).
     int coupling_cells() const { return block_; }
-    std::size_t stored_weights() const { return volume_.weights.size() + felt_.weights.size(); }
+    std::size_t stored_weights() const;
 
 private:
-    /// A run of cells along x, of one particle.
+    /// Neighbouring cells (or blocks) along x, of one particle.
     struct Row {
-        std::int32_t start = 0;   // linear cell index
+        std::uint32_t start = 0;  // linear index of the first
+        std::int32_t plane = 0;   // k
         std::int32_t length = 0;
-        std::int32_t plane = 0;   // k of the run
     };
-    /// Weights of all particles on one (cell or block) grid, particle after particle.
+    /// Weights of a chunk of particles, one after the other.
     struct Weights {
         std::vector<Row> rows;
-        std::vector<std::size_t> first_row, first_weight;  // per particle, one past the end last
-        std::vector<double> weights;
+        std::vector<double> values;
+        std::vector<std::size_t> first_row, first_value;  // per particle, one past the end last
+        std::vector<std::int32_t> low_plane, high_plane;  // per particle
     };
+    /// Grid the weights refer to: the padded cells of the flow, or blocks of cells.
+    struct Target {
+        Eigen::Vector3i cells = Eigen::Vector3i::Zero();
+        double cell = 0.0;
+        Eigen::Matrix<std::ptrdiff_t, 3, 1> stride;
+        std::ptrdiff_t offset = 0;
+        std::size_t total = 0;
+    };
+    using Quads = Field;  // four values per cell: volume and flux, coefficient and force, ...
 
-    void find_weights(Weights& target, const Eigen::Vector3i& cells, double cell, double support_factor,
-                      std::span<const Eigen::Vector3d> positions, std::span<const double> diameters,
-                      const std::vector<double>& open) const;
-    template <int width, class Value>
-    void scatter(const Weights& source, const Eigen::Vector3i& cells, std::vector<double>& target, const Value& value) const;
-    template <int width>
-    void gather(const Weights& source, std::size_t particle, const std::vector<double>& field, double* sum) const;
-    void to_blocks(const std::vector<double>& cell_values, int width, std::vector<double>& block_values) const;
+    void choose_blocks(std::span<const double> diameters);
+    void find_open(const Field* cell_solid);
+    void find_weights(std::vector<Weights>& chunks, const Target& target, const Field& open, double factor,
+                      std::span<const Eigen::Vector3d> positions, std::span<const double> diameters) const;
+    void add_particle(Weights& weights, const Target& target, const Field& open, double radius, const Eigen::Vector3d& position) const;
+    void add_row(Weights& weights, const Target& target, const Field* open, double radius, double x, double squared, int j, int k) const;
+    template <class Value>
+    void scatter(const std::vector<Weights>& chunks, const Target& target, Quads& quads, const Value& value) const;
+    template <class Value>
+    void gather(const std::vector<Weights>& chunks, const Value& value, std::span<Eigen::Vector4d> sums) const;
+    template <class CellValue>
+    void average_blocks(Quads& quads, const CellValue& value) const;
+    void cell_row(const Quads& block_values, int j, int k, double* row) const;
 
     GridSpec grid_;
     Layout layout_;
     KernelOptions options_;
-    int block_ = 1;
     std::size_t count_ = 0;
-    Weights volume_, felt_;
-    std::vector<double> open_cells_, open_blocks_;  // 1 - phi per cell; its sum per block
-    std::vector<double> volumes_, clip_;            // V_i; (1 - eps)/(raw solid fraction) per cell
-    Field void_fraction_;
+    int block_ = 1;
+    Target cells_, blocks_;
+    std::vector<Weights> volume_, felt_;
+    Field open_cells_, open_blocks_;  // 1 - phi per cell (padded); its sum per block
+    Field void_fraction_, clip_;      // clip_: (1 - eps)/(raw solid fraction); empty when nothing is clipped
+    Quads cell_quads_;
+    mutable Quads block_quads_;
+    mutable std::vector<Eigen::Vector4d> sums_;
+    std::array<std::vector<double>, 3> low_share_, high_share_;  // per axis: how a cell's reaction divides between its two faces
 };
 
 }  // namespace coral::fluid

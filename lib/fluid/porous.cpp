@@ -1,0 +1,476 @@
+#include "fluid/porous.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "core/parallel.h"
+
+namespace coral::fluid {
+
+using Eigen::Vector3d;
+using Eigen::Vector3i;
+using Eigen::Vector4d;
+
+namespace {
+
+constexpr std::size_t particles_per_chunk = 64;
+constexpr std::size_t planes_per_slab = 8;
+
+int wrap(int i, int n) { return ((i % n) + n) % n; }
+
+/// Cell that a position beyond the walls at 0 and n mirrors to.
+int fold(int i, int n)
+{
+    const int m = wrap(i, 2 * n);
+    return m < n ? m : 2 * n - 1 - m;
+}
+
+class Stopwatch {
+public:
+    explicit Stopwatch(double& total) : total_(total), start_(std::chrono::steady_clock::now()) {}
+    ~Stopwatch() { total_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
+
+private:
+    double& total_;
+    std::chrono::steady_clock::time_point start_;
+};
+
+Vector4d quad(const Field& quads, std::size_t at) { return Eigen::Map<const Vector4d>(quads.data() + 4 * at); }
+
+}  // namespace
+
+double peskin_kernel(double r)
+{
+    // both branches without a jump in the code: rows of cells vectorise
+    const double inner = 0.125 * (3.0 - 2.0 * r + std::sqrt(std::max(1.0 + 4.0 * r - 4.0 * r * r, 0.0)));
+    const double outer = 0.125 * (5.0 - 2.0 * r - std::sqrt(std::max(-7.0 + 12.0 * r - 4.0 * r * r, 0.0)));
+    return r <= 1.0 ? inner : (r <= 2.0 ? outer : 0.0);
+}
+
+FineCoupling::FineCoupling(const GridSpec& grid, const KernelOptions& options) : grid_(grid), layout_(grid.cells), options_(options)
+{
+    cells_.cells = grid.cells;
+    cells_.cell = grid.cell;
+    for (int d = 0; d < 3; ++d) cells_.stride[d] = layout_.stride[d];
+    cells_.offset = std::ptrdiff_t(layout_.index(0, 0, 0));
+    cells_.total = layout_.total;
+    for (int d = 0; d < 3; ++d) {
+        const int n = grid.cells[d];
+        // half to each face; all to the other one where a face has a given velocity and could not answer
+        for (int i = 0; i < n; ++i) {
+            const bool low = i >= grid.first_unknown(d), high = i + 1 < grid.last_unknown(d) || grid.periodic(d);
+            low_share_[d].push_back(low ? (high ? 0.5 : 1.0) : 0.0);
+            high_share_[d].push_back(high ? (low ? 0.5 : 1.0) : 0.0);
+        }
+    }
+    void_fraction_ = layout_.make_field(1.0);
+    open_cells_ = layout_.make_field(1.0);
+}
+
+std::size_t FineCoupling::stored_weights() const
+{
+    std::size_t sum = 0;
+    for (const auto* chunks : {&volume_, &felt_})
+        for (const Weights& w : *chunks) sum += w.values.size();
+    return sum;
+}
+
+/// Largest block that divides the grid and leaves 1.5 blocks per smallest diameter: the felt averages do not change [fluid-notes, section 7].
+void FineCoupling::choose_blocks(std::span<const double> diameters)
+{
+    block_ = std::max(options_.coupling_cells, 1);
+    if (options_.coupling_cells <= 0) {
+        double smallest = 4.0 * 1.5 * grid_.cell;  // no more than 4 cells
+        for (const double d : diameters) smallest = std::min(smallest, d);
+        block_ = std::max(1, int(smallest / (1.5 * grid_.cell) + 1e-9));
+    }
+    while (block_ > 1 && ((grid_.cells.array() / block_) * block_ != grid_.cells.array()).any()) --block_;
+    blocks_.cells = grid_.cells / block_;
+    blocks_.cell = grid_.cell * block_;
+    blocks_.stride = {1, blocks_.cells.x(), std::ptrdiff_t(blocks_.cells.x()) * blocks_.cells.y()};
+    blocks_.offset = 0;
+    blocks_.total = std::size_t(blocks_.stride[2]) * std::size_t(blocks_.cells.z());
+}
+
+void FineCoupling::find_open(const Field* cell_solid)
+{
+    open_blocks_.resize(blocks_.total);
+    parallel_blocks(std::size_t(blocks_.cells.z()), planes_per_slab, [&](std::size_t begin, std::size_t end) {
+        const auto first = open_blocks_.begin() + std::ptrdiff_t(begin) * blocks_.stride[2];
+        std::fill(first, open_blocks_.begin() + std::ptrdiff_t(end) * blocks_.stride[2], 0.0);
+        for (int k = int(begin) * block_; k < int(end) * block_; ++k)
+            for (int j = 0; j < grid_.cells.y(); ++j) {
+                const std::size_t c0 = layout_.index(0, j, k);
+                double* sum = open_blocks_.data() + (k / block_) * blocks_.stride[2] + (j / block_) * blocks_.stride[1];
+                for (int i = 0; i < grid_.cells.x(); ++i) {
+                    const double open = cell_solid ? 1.0 - (*cell_solid)[c0 + std::size_t(i)] : 1.0;
+                    open_cells_[c0 + std::size_t(i)] = open;
+                    sum[i / block_] += open;
+                }
+            }
+    });
+}
+
+/// Weights of one row of cells, cut or folded at the sides of the domain. `open` null: solid cells count as well.
+void FineCoupling::add_row(Weights& weights, const Target& target, const Field* open, double radius, double x, double squared, int j,
+                           int k) const
+{
+    const int n = target.cells.x();
+    const double h = target.cell, scale = 2.0 / radius;
+    const double half = std::sqrt(std::max(radius * radius - squared, 0.0));
+    const int low = int(std::ceil((x - half) / h - 0.5)), high = int(std::floor((x + half) / h - 0.5));
+    const auto weight = [&](int i) {
+        const double dx = (i + 0.5) * h - x;
+        return peskin_kernel(scale * std::sqrt(dx * dx + squared));
+    };
+    const std::ptrdiff_t base = target.offset + j * target.stride[1] + k * target.stride[2];
+    const auto add_run = [&](int first, int length) {  // appends zeros; returns where they start
+        weights.rows.push_back({std::uint32_t(base + first), k, length});
+        weights.values.resize(weights.values.size() + std::size_t(length), 0.0);
+        return weights.values.data() + weights.values.size() - length;
+    };
+    const auto shut = [&](double* values, int first, int length) {
+        if (open)
+            for (int l = 0; l < length; ++l) values[l] *= (*open)[std::size_t(base + first + l)];
+    };
+    if (low > high) return;
+    if (grid_.periodic(0)) {
+        for (int i = low; i <= high;) {
+            const int first = wrap(i, n), length = std::min(high - i + 1, n - first);
+            double* values = add_run(first, length);
+            for (int l = 0; l < length; ++l) values[l] = weight(i + l);
+            shut(values, first, length);
+            i += length;
+        }
+        return;
+    }
+    if (low >= 0 && high < n) {
+        const int length = high - low + 1;
+        double* values = add_run(low, length);
+        for (int l = 0; l < length; ++l) values[l] = weight(low + l);
+        shut(values, low, length);
+        return;
+    }
+    const bool wide = high - low + 1 >= n;
+    const int first = wide || low < 0 ? 0 : std::min(low, fold(high, n));
+    const int last = wide || high >= n ? n - 1 : std::max(high, fold(low, n));
+    double* values = add_run(first, last - first + 1);
+    for (int i = low; i <= high; ++i) values[fold(i, n) - first] += weight(i);
+    shut(values, first, last - first + 1);
+}
+
+void FineCoupling::add_particle(Weights& weights, const Target& target, const Field& open, double radius, const Vector3d& position) const
+{
+    const Vector3d size = grid_.size();
+    Vector3d x = position - grid_.origin;
+    for (int d = 0; d < 3; ++d) {
+        if (grid_.periodic(d))
+            x[d] -= size[d] * std::floor(x[d] / size[d]);
+        else
+            x[d] = std::clamp(x[d], 0.0, size[d]);
+    }
+    const double h = target.cell;
+    const auto target_cell = [&](int i, int d) { return grid_.periodic(d) ? wrap(i, target.cells[d]) : fold(i, target.cells[d]); };
+    const std::size_t first_row = weights.rows.size(), first_value = weights.values.size();
+    for (const Field* pass : {&open, static_cast<const Field*>(nullptr)}) {  // the second when every cell around is solid
+        for (int k = int(std::ceil((x.z() - radius) / h - 0.5)); k <= int(std::floor((x.z() + radius) / h - 0.5)); ++k) {
+            const double dz = (k + 0.5) * h - x.z(), reach = std::sqrt(std::max(radius * radius - dz * dz, 0.0));
+            for (int j = int(std::ceil((x.y() - reach) / h - 0.5)); j <= int(std::floor((x.y() + reach) / h - 0.5)); ++j) {
+                const double dy = (j + 0.5) * h - x.y();
+                add_row(weights, target, pass, radius, x.x(), dy * dy + dz * dz, target_cell(j, 1), target_cell(k, 2));
+            }
+        }
+        double sum = 0.0;
+        for (std::size_t v = first_value; v < weights.values.size(); ++v) sum += weights.values[v];
+        if (sum > 1e-6 || !pass) {
+            for (std::size_t v = first_value; v < weights.values.size(); ++v) weights.values[v] /= sum;
+            break;
+        }
+        weights.rows.resize(first_row);
+        weights.values.resize(first_value);
+    }
+    std::int32_t low = target.cells.z(), high = -1;
+    for (std::size_t r = first_row; r < weights.rows.size(); ++r) {
+        low = std::min(low, weights.rows[r].plane);
+        high = std::max(high, weights.rows[r].plane);
+    }
+    weights.low_plane.push_back(low);
+    weights.high_plane.push_back(high);
+    weights.first_row.push_back(weights.rows.size());
+    weights.first_value.push_back(weights.values.size());
+}
+
+void FineCoupling::find_weights(std::vector<Weights>& chunks, const Target& target, const Field& open, double factor,
+                                std::span<const Vector3d> positions, std::span<const double> diameters) const
+{
+    chunks.resize((positions.size() + particles_per_chunk - 1) / particles_per_chunk);
+    parallel_blocks(positions.size(), particles_per_chunk, [&](std::size_t begin, std::size_t end) {
+        Weights& weights = chunks[begin / particles_per_chunk];
+        weights.rows.clear(), weights.values.clear(), weights.low_plane.clear(), weights.high_plane.clear();
+        weights.first_row.assign(1, 0), weights.first_value.assign(1, 0);
+        for (std::size_t p = begin; p < end; ++p) {
+            const double support = std::max(options_.volume_support * diameters[p], options_.smallest_support * grid_.cell);
+            add_particle(weights, target, open, 0.5 * factor * support, positions[p]);
+        }
+    });
+}
+
+void FineCoupling::place(std::span<const Vector3d> positions, std::span<const double> diameters, const Field* cell_solid)
+{
+    count_ = positions.size();
+    choose_blocks(diameters);
+    find_open(cell_solid);
+    find_weights(volume_, cells_, open_cells_, 1.0, positions, diameters);
+    find_weights(felt_, blocks_, open_blocks_, options_.felt_support / options_.volume_support, positions, diameters);
+}
+
+/// quads[c] += w_ic value(i) for all particles: each slab of planes takes its rows from all particles in order, so that no two
+/// threads meet and the order of additions does not depend on their number.
+template <class Value>
+void FineCoupling::scatter(const std::vector<Weights>& chunks, const Target& target, Quads& quads, const Value& value) const
+{
+    quads.resize(4 * target.total);
+    const auto first_cell = [&](std::size_t plane) { return std::size_t(target.offset) + plane * std::size_t(target.stride[2]); };
+    parallel_blocks(std::size_t(target.cells.z()), planes_per_slab, [&](std::size_t begin, std::size_t end) {
+        const std::size_t last = end == std::size_t(target.cells.z()) ? target.total : first_cell(end);
+        std::fill(quads.begin() + std::ptrdiff_t(4 * first_cell(begin)), quads.begin() + std::ptrdiff_t(4 * last), 0.0);
+        for (std::size_t chunk = 0; chunk < chunks.size(); ++chunk) {
+            const Weights& w = chunks[chunk];
+            for (std::size_t p = 0; p < w.low_plane.size(); ++p) {
+                if (w.high_plane[p] < int(begin) || w.low_plane[p] >= int(end)) continue;
+                const Vector4d amount = value(chunk * particles_per_chunk + p);
+                const double* weight = w.values.data() + w.first_value[p];
+                for (std::size_t r = w.first_row[p]; r < w.first_row[p + 1]; ++r) {
+                    const Row& row = w.rows[r];
+                    if (row.plane >= int(begin) && row.plane < int(end)) {
+                        double* at = quads.data() + 4 * std::size_t(row.start);
+                        for (int l = 0; l < row.length; ++l) Eigen::Map<Vector4d>(at + 4 * l) += weight[l] * amount;
+                    }
+                    weight += row.length;
+                }
+            }
+        }
+    });
+}
+
+/// sums[i] = sum_c w_ic value(c).
+template <class Value>
+void FineCoupling::gather(const std::vector<Weights>& chunks, const Value& value, std::span<Vector4d> sums) const
+{
+    parallel_blocks(chunks.size(), 1, [&](std::size_t chunk, std::size_t) {
+        const Weights& w = chunks[chunk];
+        for (std::size_t p = 0; p < w.low_plane.size(); ++p) {
+            Vector4d sum = Vector4d::Zero();
+            const double* weight = w.values.data() + w.first_value[p];
+            for (std::size_t r = w.first_row[p]; r < w.first_row[p + 1]; ++r) {
+                const Row& row = w.rows[r];
+                for (int l = 0; l < row.length; ++l) sum += weight[l] * value(std::size_t(row.start) + std::size_t(l));
+                weight += row.length;
+            }
+            sums[chunk * particles_per_chunk + p] = sum;
+        }
+    });
+}
+
+/// Per block the mean of value(cell) over its cells, weighted by how open they are (all alike in a block that is solid throughout).
+template <class CellValue>
+void FineCoupling::average_blocks(Quads& quads, const CellValue& value) const
+{
+    quads.resize(4 * blocks_.total);
+    const double closed = double(block_) * block_ * block_;
+    parallel_blocks(std::size_t(blocks_.cells.z()), planes_per_slab, [&](std::size_t begin, std::size_t end) {
+        std::fill(quads.begin() + 4 * std::ptrdiff_t(begin) * blocks_.stride[2], quads.begin() + 4 * std::ptrdiff_t(end) * blocks_.stride[2],
+                  0.0);
+        for (int k = int(begin) * block_; k < int(end) * block_; ++k)
+            for (int j = 0; j < grid_.cells.y(); ++j) {
+                const std::size_t c0 = layout_.index(0, j, k);
+                const auto b0 = std::size_t((k / block_) * blocks_.stride[2] + (j / block_) * blocks_.stride[1]);
+                for (int i = 0, b = 0; i < grid_.cells.x(); ++b) {
+                    const double open = open_blocks_[b0 + std::size_t(b)];
+                    Vector4d sum = Vector4d::Zero();
+                    for (int l = 0; l < block_; ++l, ++i) {
+                        const std::size_t c = c0 + std::size_t(i);
+                        sum += (open > 0.0 ? open_cells_[c] : 1.0) * value(c, i, j, k);
+                    }
+                    Eigen::Map<Vector4d>(quads.data() + 4 * (b0 + std::size_t(b))) += sum / (open > 0.0 ? open : closed);
+                }
+            }
+    });
+}
+
+void FineCoupling::deposit_volume(Flow& flow, std::span<const double> volumes, std::span<const Vector3d> velocities)
+{
+    const Stopwatch watch(flow.times().fines);
+    const double inverse = 1.0 / grid_.cell_volume();
+    scatter(volume_, cells_, cell_quads_, [&](std::size_t p) {
+        const double v = volumes[p] * inverse;
+        return Vector4d(v, v * velocities[p].x(), v * velocities[p].y(), v * velocities[p].z());
+    });
+    PorousFields& fields = flow.porous_fields_for_writing();
+    const double most = 1.0 - options_.smallest_void_fraction;
+    std::vector<char> clipped(std::size_t(grid_.cells.z()), 0);
+    parallel_blocks(std::size_t(grid_.cells.z()), planes_per_slab, [&](std::size_t begin, std::size_t end) {
+        for (int k = int(begin); k < int(end); ++k)
+            for (int j = 0; j < grid_.cells.y(); ++j) {
+                const std::size_t c0 = layout_.index(0, j, k);
+                for (std::size_t c = c0; c < c0 + std::size_t(grid_.cells.x()); ++c) {
+                    const double solid = cell_quads_[4 * c];
+                    void_fraction_[c] = 1.0 - std::min(solid, most);
+                    if (solid > most) clipped[std::size_t(k)] = 1;
+                }
+            }
+    });
+    clip_.clear();
+    if (std::any_of(clipped.begin(), clipped.end(), [](char c) { return c != 0; })) {
+        clip_ = layout_.make_field(1.0);
+        for (std::size_t c = 0; c < clip_.size(); ++c)
+            if (cell_quads_[4 * c] > most) clip_[c] = most / cell_quads_[4 * c];
+    }
+    for (int d = 0; d < 3; ++d) {
+        Field& J = fields.solid_flux[d];
+        const auto s = std::size_t(layout_.stride[d]);
+        const Vector3i last = grid_.cells + Vector3i::Unit(d);
+        parallel_blocks(std::size_t(last.z()), planes_per_slab, [&, d](std::size_t begin, std::size_t end) {
+            Vector3i c;
+            for (c[2] = int(begin); c[2] < int(end); ++c[2])
+                for (c[1] = 0; c[1] < last.y(); ++c[1])
+                    for (c[0] = 0; c[0] < last.x(); ++c[0]) {
+                        const std::size_t f = layout_.index(c.x(), c.y(), c.z());
+                        const int n = grid_.cells[d];
+                        if (c[d] > 0 && c[d] < n) {
+                            J[f] = 0.5 * (cell_quads_[4 * (f - s) + 1 + std::size_t(d)] + cell_quads_[4 * f + 1 + std::size_t(d)]);
+                        } else if (grid_.periodic(d)) {
+                            const std::size_t first = c[d] == 0 ? f : f - std::size_t(n) * s, end_cell = first + std::size_t(n - 1) * s;
+                            J[f] = 0.5 * (cell_quads_[4 * end_cell + 1 + std::size_t(d)] + cell_quads_[4 * first + 1 + std::size_t(d)]);
+                        } else {
+                            const bool open = grid_.outlet(d, c[d] == 0 ? 0 : 1);
+                            J[f] = open ? cell_quads_[4 * (c[d] == 0 ? f : f - s) + 1 + std::size_t(d)] : 0.0;
+                        }
+                    }
+        });
+    }
+    flow.change_void_fraction(void_fraction_);
+}
+
+void FineCoupling::feel(const Flow& flow, std::span<FeltFlow> felt) const
+{
+    const double* p = flow.pressure().data();
+    const double* u[3] = {flow.velocity(0).data(), flow.velocity(1).data(), flow.velocity(2).data()};
+    const auto sy = std::size_t(layout_.stride[1]), sz = std::size_t(layout_.stride[2]);
+    const double half = 0.5 / grid_.cell;
+    sums_.resize(count_);
+    gather(
+        volume_,
+        [&](std::size_t c) {
+            const double scale = clip_.empty() ? half : half * clip_[c];
+            return Vector4d(scale * (p[c + 1] - p[c - 1]), scale * (p[c + sy] - p[c - sy]), scale * (p[c + sz] - p[c - sz]), 0.0);
+        },
+        sums_);
+    for (std::size_t i = 0; i < count_; ++i) felt[i].pressure_gradient = sums_[i].head<3>();
+    average_blocks(block_quads_, [&](std::size_t c, int, int, int) {
+        const double eps = void_fraction_[c];
+        return Vector4d(eps, 0.5 * eps * (u[0][c] + u[0][c + 1]), 0.5 * eps * (u[1][c] + u[1][c + sy]),
+                        0.5 * eps * (u[2][c] + u[2][c + sz]));
+    });
+    gather(felt_, [&](std::size_t b) { return quad(block_quads_, b); }, sums_);
+    for (std::size_t i = 0; i < count_; ++i) {
+        felt[i].void_fraction = sums_[i][0];
+        felt[i].velocity = sums_[i].tail<3>() / sums_[i][0];
+    }
+}
+
+/// Four values of each cell of a row, from those of the blocks divided by how open the cells are.
+void FineCoupling::cell_row(const Quads& block_values, int j, int k, double* row) const
+{
+    const std::size_t c0 = layout_.index(0, j, k);
+    const auto b0 = std::size_t((k / block_) * blocks_.stride[2] + (j / block_) * blocks_.stride[1]);
+    const double closed = double(block_) * block_ * block_;
+    for (int i = 0, b = 0; i < grid_.cells.x(); ++b) {
+        const double open = open_blocks_[b0 + std::size_t(b)];
+        const Vector4d per_open = quad(block_values, b0 + std::size_t(b)) / (open > 0.0 ? open : closed);
+        for (int l = 0; l < block_; ++l, ++i)
+            Eigen::Map<Vector4d>(row + 4 * i) = (open > 0.0 ? open_cells_[c0 + std::size_t(i)] : 1.0) * per_open;
+    }
+}
+
+void FineCoupling::deposit_drag(Flow& flow, std::span<const double> coefficients, std::span<const Vector3d> forces)
+{
+    const Stopwatch watch(flow.times().fines);
+    const double scale = 1.0 / (flow.options().density * grid_.cell_volume());
+    scatter(felt_, blocks_, block_quads_, [&](std::size_t p) {
+        return Vector4d(scale * Vector4d(coefficients[p], forces[p].x(), forces[p].y(), forces[p].z()));
+    });
+    PorousFields& fields = flow.porous_fields_for_writing();
+    const Vector3i n = grid_.cells;
+    const auto half_outside = [&](int d, int f) { return (f == 0 && grid_.outlet(d, 0)) || (f == n[d] && grid_.outlet(d, 1)) ? 2.0 : 1.0; };
+    // faces of plane k need the cells of planes k - 1 and k
+    parallel_blocks(std::size_t(n.z()) + 1, planes_per_slab, [&](std::size_t begin, std::size_t end) {
+        const std::size_t row_size = 4 * std::size_t(n.x());
+        std::vector<double> here(row_size), below(row_size), behind(row_size);
+        const auto load = [&](int j, int k, std::vector<double>& row) {
+            const bool outside = (!grid_.periodic(1) && (j < 0 || j >= n.y())) || (!grid_.periodic(2) && (k < 0 || k >= n.z()));
+            if (outside)
+                std::fill(row.begin(), row.end(), 0.0);
+            else
+                cell_row(block_quads_, wrap(j, n.y()), wrap(k, n.z()), row.data());
+        };
+        const auto share = [&](const std::vector<double>& shares, int i, int d) {
+            if (grid_.periodic(d)) i = wrap(i, n[d]);
+            return i >= 0 && i < n[d] ? shares[std::size_t(i)] : 0.0;
+        };
+        const auto put = [&](int d, std::size_t f0, int count, double low, double high, const std::vector<double>& before,
+                             const std::vector<double>& after) {
+            for (int i = 0; i < count; ++i) {
+                fields.drag_rate[d][f0 + std::size_t(i)] = low * before[4 * std::size_t(i)] + high * after[4 * std::size_t(i)];
+                fields.drag_force[d][f0 + std::size_t(i)] =
+                    low * before[4 * std::size_t(i) + 1 + std::size_t(d)] + high * after[4 * std::size_t(i) + 1 + std::size_t(d)];
+            }
+        };
+        for (int k = int(begin); k < int(end); ++k) {
+            load(-1, k, below);
+            for (int j = 0; j <= n.y(); ++j) {
+                load(j, k, here);
+                load(j, k - 1, behind);
+                const std::size_t f0 = layout_.index(0, j, k);
+                const double half_y = half_outside(1, j), half_z = half_outside(2, k);
+                if (j < n.y())
+                    put(2, f0, n.x(), half_z * share(high_share_[2], k - 1, 2), half_z * share(low_share_[2], k, 2), behind, here);
+                if (k < n.z())
+                    put(1, f0, n.x(), half_y * share(high_share_[1], j - 1, 1), half_y * share(low_share_[1], j, 1), below, here);
+                if (j < n.y() && k < n.z())
+                    for (int i = 0; i <= n.x(); ++i) {
+                        const double half_x = half_outside(0, i);
+                        const double low = half_x * share(high_share_[0], i - 1, 0), high = half_x * share(low_share_[0], i, 0);
+                        const std::size_t before = 4 * std::size_t(wrap(i - 1, n.x())), after = 4 * std::size_t(wrap(i, n.x()));
+                        fields.drag_rate[0][f0 + std::size_t(i)] = low * here[before] + high * here[after];
+                        fields.drag_force[0][f0 + std::size_t(i)] = low * here[before + 1] + high * here[after + 1];
+                    }
+                std::swap(here, below);
+            }
+        }
+    });
+}
+
+void FineCoupling::drag_lag(const Flow& flow, std::span<const double> coefficients, std::span<Vector3d> lag) const
+{
+    const double* u[3] = {flow.velocity(0).data(), flow.velocity(1).data(), flow.velocity(2).data()};
+    const double* us[3] = {flow.provisional(0).data(), flow.provisional(1).data(), flow.provisional(2).data()};
+    // the transpose of deposit_drag: each cell sees its faces with the shares it gave them
+    average_blocks(block_quads_, [&](std::size_t c, int i, int j, int k) {
+        const int at[3] = {i, j, k};
+        Vector4d change = Vector4d::Zero();
+        for (int d = 0; d < 3; ++d) {
+            const auto m = std::size_t(at[d]);
+            std::size_t high = c + std::size_t(layout_.stride[d]);
+            if (grid_.periodic(d) && at[d] + 1 == grid_.cells[d]) high = c - m * std::size_t(layout_.stride[d]);  // u* has no copy there yet
+            change[d] = low_share_[d][m] * (us[d][c] - u[d][c]) + high_share_[d][m] * (us[d][high] - u[d][high]);
+        }
+        return change;
+    });
+    sums_.resize(count_);
+    gather(felt_, [&](std::size_t b) { return quad(block_quads_, b); }, sums_);
+    for (std::size_t i = 0; i < count_; ++i) lag[i] = coefficients[i] * sums_[i].head<3>();
+}
+
+}  // namespace coral::fluid
