@@ -54,7 +54,7 @@ void World::Impl::node_loop(double dt)
             Field field;
             const Shape& surface = *shapes[std::size_t(shape[a])];
             double master_inverse_mass = 0.0, reach_b = 0.0, inverse_radius = 1.0 / equivalent[a];
-            Vec3 velocity_b = Vec3::Zero(), spin_b = Vec3::Zero(), to_b = Vec3::Zero();
+            Vec3 velocity_b = Vec3::Zero(), end_b = Vec3::Zero(), spin_b = Vec3::Zero(), to_b = Vec3::Zero();
             Index material_b;
             if (master >= 0) {
                 const std::size_t b = std::size_t(master);
@@ -66,13 +66,14 @@ void World::Impl::node_loop(double dt)
                 master_inverse_mass = inverse_mass[b];
                 inverse_radius += 1.0 / equivalent[b];
                 velocity_b = v[b];
+                end_b = v_end[b];
                 spin_b = w[b];
                 material_b = material[b];
                 reach_b = equivalent[b];
             } else {
                 const WallData& wall = walls[std::size_t(-1 - master)];
                 field.wall = &wall;
-                velocity_b = wall.velocity;
+                velocity_b = end_b = wall.velocity;
                 material_b = wall.material;
                 reach_b = equivalent[a];
             }
@@ -109,7 +110,7 @@ void World::Impl::node_loop(double dt)
                 const double weight = l.force[k] * inverse_total, slope = l.gradient[k].norm();
                 const Vec3 n = slope < 1e-9 ? Vec3::UnitZ() : Vec3(l.gradient[k] / slope);
                 const Vec3 arm = q[a] * (scale[a] * surface.nodes()[std::size_t(l.node[k])]);
-                const Vec3 relative = v[a] + w[a].cross(arm) - velocity_b - spin_b.cross(to_b + arm);
+                const Vec3 relative = v_end[a] + w[a].cross(arm) - end_b - spin_b.cross(to_b + arm);
                 double fn = l.force[k] * slope;
                 if (pair.damping > 0.0 && weight > 0.0) {
                     LoopSums node_sums;
@@ -214,6 +215,7 @@ void World::Impl::refresh_forces()
     if (forces_valid) return;
     const double before = sums.elastic_normal + sums.elastic_tangential;
     const double friction = dissipated_friction;
+    v_end = v;
     compute_contacts(0.0);
     // What bodies put in, taken out or moved by the caller changed in the contacts is the caller's work.
     wall_work += sums.elastic_normal + sums.elastic_tangential - before + dissipated_friction - friction;

@@ -9,12 +9,22 @@ namespace coral::dem {
 
 namespace {
 
-/// Work of a spring over the step in which it opens or closes. The trapezoid of the two forces takes kn d1 (d1 - d0)/2 where the
-/// spring holds kn d1^2/2 (d0 < 0 < d1): the excess -kn d0 d1/2 goes back to the motion; on opening the same is taken.
-void add_crossing(std::vector<Crossing>& list, Index a, Index b, double kn, double before, double now, const Vec3& normal, const Vec3& arm_b)
+/// Work of a contact over the step in which it opens or closes, overlap d0 -> d1. The trapezoid of the two forces takes kn d1 (d1 - d0)/2
+/// where the spring holds kn d1^2/2 (d0 < 0 < d1): the excess -kn d0 d1/2 goes back to the motion; on opening the same is taken.
+/// The dashpot acts for half the step, but should for the part d1/(d1 - d0) of it (opening: no force is left to correct).
+void add_crossing(std::vector<Crossing>& list, Index a, Index b, const PairLaw& pair, double before, double now, double approach,
+                  double reduced_mass, double dt, const Vec3& normal, const Vec3& arm_b, LoopSums& sums)
 {
-    const double energy = -0.5 * kn * before * now;
-    if (energy > 0.0) list.push_back({a, b, now > 0.0 ? energy : -energy, normal, arm_b});
+    if (before * now >= 0.0) return;
+    const double spring = -0.5 * pair.kn * before * now;
+    if (now < 0.0) {
+        list.push_back({a, b, -spring, normal, arm_b});
+        return;
+    }
+    const double c = 2.0 * pair.damping * std::sqrt(reduced_mass * pair.kn);
+    const double dashpot = c * approach * approach * dt * (now / (now - before) - 0.5);
+    sums.damping += dashpot;
+    list.push_back({a, b, spring - dashpot, normal, arm_b});
 }
 
 }  // namespace
@@ -44,9 +54,12 @@ void World::Impl::sphere_loop(double dt)
                 const Vec3 n = length > 0.0 ? Vec3(d / length) : Vec3::UnitZ();
                 const double overlap = reach - length;
                 const Vec3 relative = v[i] - v[j];
+                const double reduced = 1.0 / (inverse_mass[i] + inverse_mass[j]);
+                const double approach = (v_end[j] - v_end[i]).dot(n);
                 const bool touching = overlap > 0.0;
                 if (touching != (l.touch[k] != 0) && dt > 0.0 && l.touch[k] != 2)
-                    add_crossing(crossing, Index(i), Index(j), pair.kn, reach - (d - relative * dt).norm(), overlap, n, Vec3::Zero());
+                    add_crossing(crossing, Index(i), Index(j), pair, reach - (d - relative * dt).norm(), overlap, approach, reduced, dt, n,
+                                 Vec3::Zero(), s);
                 if (!touching) {
                     s.friction += 0.5 * pair.kt * l.spring[k].squaredNorm();
                     l.spring[k].setZero();
@@ -55,11 +68,9 @@ void World::Impl::sphere_loop(double dt)
                 }
                 const double smaller = std::min(ri, rs[j]), cap = options.overlap_cap * smaller;
                 const double pressed = std::min(overlap, cap);
-                const double reduced = 1.0 / (inverse_mass[i] + inverse_mass[j]);
-                const double approach = -relative.dot(n);
                 const double fn = normal_force(pair.kn * pressed, approach, pair.kn, pair.damping, reduced, dt, s);
                 const double arm_i = ri - 0.5 * overlap, arm_j = rs[j] - 0.5 * overlap;
-                const Vec3 slide = relative + approach * n - (arm_i * w[i] + arm_j * w[j]).cross(n);
+                const Vec3 slide = relative - relative.dot(n) * n - (arm_i * w[i] + arm_j * w[j]).cross(n);
                 out->tangential = tangential_force(pair, fn, n, slide, 0.5 * (w[i] + w[j]).dot(n), reduced, dt, 1.0, l.spring[k], s);
                 out->a = Index(i);
                 out->b = Index(j);
@@ -106,9 +117,9 @@ void World::Impl::sphere_wall_loop(double dt)
             if (!touching && l.touch[k] == 0) continue;
             const PairLaw& pair = law(material[i], wall.material);
             const Vec3 relative = v[i] - wall.velocity;
-            const double approach = -relative.dot(n);
+            const double approach = (wall.velocity - v_end[i]).dot(n), reduced = mass[i];
             if (touching != (l.touch[k] != 0) && dt > 0.0 && facing && l.touch[k] != 2)
-                add_crossing(crossing, Index(i), -1 - l.wall[k], pair.kn, overlap - approach * dt, overlap, n, Vec3::Zero());
+                add_crossing(crossing, Index(i), -1 - l.wall[k], pair, overlap + relative.dot(n) * dt, overlap, approach, reduced, dt, n, Vec3::Zero(), s);
             if (!touching) {
                 s.friction += 0.5 * pair.kt * l.spring[k].squaredNorm();
                 l.spring[k].setZero();
@@ -116,10 +127,9 @@ void World::Impl::sphere_wall_loop(double dt)
                 continue;
             }
             const double cap = options.overlap_cap * ri, pressed = std::min(overlap, cap);
-            const double reduced = mass[i];
             const double fn = normal_force(pair.kn * pressed, approach, pair.kn, pair.damping, reduced, dt, s);
             const double arm = ri - overlap;
-            const Vec3 slide = relative + approach * n - (arm * w[i]).cross(n);
+            const Vec3 slide = relative - relative.dot(n) * n - (arm * w[i]).cross(n);
             out->tangential = tangential_force(pair, fn, n, slide, 0.5 * w[i].dot(n), reduced, dt, 1.0, l.spring[k], s);
             out->a = Index(i);
             out->b = -1 - l.wall[k];
@@ -190,11 +200,13 @@ void World::Impl::sphere_grid_loop(double dt)
             const Vec3 n = q[j] * local_normal;
             const Vec3 arm_j = offset - n * (radius[i] - 0.5 * overlap);  // contact point, from the grid's centre
             const Vec3 relative = v[i] - v[j] - w[j].cross(offset);
+            const double reduced = 1.0 / (inverse_mass[i] + inverse_mass[j]);
+            const double approach = (v_end[j] + w[j].cross(offset) - v_end[i]).dot(n);
             if (touching != (l.touch[k] != 0) && dt > 0.0 && l.touch[k] != 2) {
                 // Where the centre was against the grid a step ago: the rigid motion of the pair taken back.
                 const Vec3 before = q[j].conjugate() * Vec3(offset - relative * dt);
                 const double past = radius[i] - scale[j] * field.sample(before / scale[j]);
-                add_crossing(crossing, Index(i), Index(j), pair.kn, past, overlap, n, offset);
+                add_crossing(crossing, Index(i), Index(j), pair, past, overlap, approach, reduced, dt, n, offset, s);
             }
             if (!touching) {
                 for (int slot = 0; slot < Slots::count; ++slot)
@@ -204,8 +216,6 @@ void World::Impl::sphere_grid_loop(double dt)
                 continue;
             }
             const double cap = options.overlap_cap * radius[i], pressed = std::min(overlap, cap);
-            const double reduced = 1.0 / (inverse_mass[i] + inverse_mass[j]);
-            const double approach = -relative.dot(n);
             const double fn = normal_force(pair.kn * pressed * slope, approach, pair.kn, pair.damping, reduced, dt, s);
             const double arm_i = radius[i] - 0.5 * overlap;
             const Vec3 velocity = v[i] - v[j] - arm_i * w[i].cross(n) - w[j].cross(arm_j);

@@ -75,15 +75,20 @@ void World::Impl::check_step(double dt) const
                     "use " + to_text(options.step_fraction * critical) + " s (automatic) or a smaller stiffness");
 }
 
-void World::Impl::kick(double dt)
+void World::Impl::kick(double dt, bool foresee)
 {
     const Vec3 g_dt = options.gravity * dt;
     for (std::size_t i = 0; i < x.size(); ++i) {
-        if (inverse_mass[i] == 0.0 || !in[i]) continue;
+        if (inverse_mass[i] == 0.0) {
+            if (foresee) v_end[i] = v[i];
+            continue;
+        }
+        const Vec3 before = v[i];
         if (i < added_mass.size() && added_mass[i] != Vec3::Zero())
             kick_with_added_mass(i, dt);
         else
             v[i] += (inverse_mass[i] * dt) * (force[i] + external_force[i]) + g_dt;
+        if (foresee) v_end[i] = 2.0 * v[i] - before;
         const Vec3 impulse = dt * (torque[i] + external_torque[i]);
         if (is_grid[i]) {
             momentum[i] += impulse;
@@ -194,14 +199,14 @@ void World::Impl::step(double dt)
     }
     auto start = std::chrono::steady_clock::now();
     constraint_work(dt);
-    kick(0.5 * dt);
+    kick(0.5 * dt, true);
     drift(dt);
     const bool expired = lists_expired();
     counters.seconds_integration += seconds_since(start);
     if (expired) make_lists();
     compute_contacts(dt);
     start = std::chrono::steady_clock::now();
-    kick(0.5 * dt);
+    kick(0.5 * dt, false);
     correct_crossings();
     constraint_work(dt);
     time += dt;

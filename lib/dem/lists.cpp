@@ -205,7 +205,7 @@ void make_node_list(World::Impl& world, const std::vector<BroadPair>& pairs, dou
     l = {};
     l.start.push_back(0);
     for (const Directed& d : directed) append_pair(world, old, l, d.slave, d.master, skin, d.share);
-    l.gradient.resize(l.node.size());
+    l.gradient.resize(l.node.size(), Vec3::Zero());
     l.force.resize(l.node.size());
     l.depth.resize(l.node.size());
     l.out.resize(l.slave.size());

@@ -67,7 +67,7 @@ struct Reader {
 template <class Archive>
 void visit_state(World::Impl& m, Archive& io)
 {
-    io(m.x), io(m.v), io(m.w), io(m.momentum), io(m.q), io(m.force), io(m.torque), io(m.external_force), io(m.external_torque);
+    io(m.x), io(m.v), io(m.v_end), io(m.w), io(m.momentum), io(m.q), io(m.force), io(m.torque), io(m.external_force), io(m.external_torque);
     io(m.scale), io(m.density), io(m.shape), io(m.material), io(m.motion), io(m.in);
     for (WallData& wall : m.walls) io(wall.point), io(wall.velocity), io(wall.force), io(wall.reference);
     io(m.options.gravity), io(m.active), io(m.lists_valid), io(m.forces_valid), io(m.skin), io(m.x_reference), io(m.q_reference);

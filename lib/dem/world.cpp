@@ -156,6 +156,7 @@ int World::add_body(const BodySpec& spec)
     if (!(density > 0.0) || !std::isfinite(density)) throw Error(where, "density " + to_text(density) + " is not positive", "give a positive density");
     m.x.push_back(spec.position);
     m.v.push_back(spec.motion == Motion::fixed ? Vec3(Vec3::Zero()) : spec.velocity);
+    m.v_end.push_back(m.v.back());
     m.w.push_back(Vec3::Zero());
     m.momentum.push_back(Vec3::Zero());
     m.q.push_back(spec.orientation.normalized());

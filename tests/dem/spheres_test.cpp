@@ -17,9 +17,9 @@ TEST(Motion, free_fall_is_exact)
     World world = quiet_world(0.3, 0.7, {0, 0, -g});
     const int shape = world.add_shape(Shape::sphere());
     const int b = add_sphere(world, shape, 2e-3, {0, 0, 1.0}, {0.1, 0, 0.2});
-    world.advance(0.1, 1e-4);
+    world.advance(0.1, 4e-6);
     EXPECT_NEAR(world.position(b).z(), 1.0 + 0.2 * 0.1 - 0.5 * g * 0.01, 1e-12);
-    EXPECT_NEAR(world.position(b).x(), 0.01, 1e-13);
+    EXPECT_NEAR(world.position(b).x(), 0.01, 1e-12);
     EXPECT_NEAR(world.velocity(b).z(), 0.2 - g * 0.1, 1e-12);
     EXPECT_NEAR(world.time(), 0.1, 1e-15);
 }
@@ -44,14 +44,14 @@ TEST(SphereContact, thousand_bounces_between_spheres_keep_the_energy_at_the_auto
     World world = quiet_world(0.0, 0.0);
     const int shape = world.add_shape(Shape::sphere());
     const double d = 2e-3, gap = 0.3e-3;
-    add_sphere(world, shape, d, {0, 0, 0}, {}, Motion::fixed);
+    add_sphere(world, shape, d, {0, 0, 0}, Vec3::Zero(), Motion::fixed);
     add_sphere(world, shape, d, {d + gap, 0, 0}, {0.31, 0, 0});
     add_sphere(world, shape, d, {2 * (d + gap), 0, 0}, {-0.17, 0, 0});
-    add_sphere(world, shape, d, {3 * (d + gap), 0, 0}, {}, Motion::fixed);
+    add_sphere(world, shape, d, {3 * (d + gap), 0, 0}, Vec3::Zero(), Motion::fixed);
     const double before = world.energy().kinetic;
     int bounces = 0;
     double last = world.velocity(1).x() - world.velocity(2).x();
-    while (bounces < 1000) {
+    while (bounces < 1000 || world.statistics().contacts > 0) {
         world.step(world.auto_time_step());
         const double now = world.velocity(1).x() - world.velocity(2).x();
         bounces += last > 0.0 && now <= 0.0;
@@ -77,9 +77,9 @@ TEST(SphereContact, thousand_bounces_on_a_plane_under_gravity_keep_the_height)
     EXPECT_NEAR(e.closure / (world.mass(0) * g * h), 0.0, 1e-3);
 }
 
-TEST(SphereContact, without_correction_of_closing_steps_the_energy_would_wander)
+TEST(SphereContact, oblique_bounces_of_unequal_spheres_keep_the_energy)
 {
-    // Oblique bounces between spheres of different size: the correction holds where the line of centres turns, too.
+    // The correction of closing and opening steps holds where the line of centres turns, too.
     World world = quiet_world(0.0, 0.0);
     const int shape = world.add_shape(Shape::sphere());
     world.add_box(Vec3::Zero(), Vec3(6e-3, 6e-3, 6e-3));
@@ -164,45 +164,7 @@ TEST(SphereContact, sliding_turns_to_rolling_at_five_sevenths)
     EXPECT_NEAR(e.friction / (e.initial - e.stored()), 1.0, 2e-2);
 }
 
-TEST(SphereContact, friction_loop_has_the_area_of_coulomb_with_spring)
-{
-    // A prescribed sphere is pushed to and fro along a fixed one's flat neighbour: a plane under constant normal load.
-    World world = quiet_world(0.0, 0.5);
-    const int shape = world.add_shape(Shape::sphere());
-    const int lower = add_sphere(world, shape, 1.0, {0, 0, 0}, {}, Motion::prescribed);  // radius 0.5 m: flat over the stroke
-    const double overlap = 1e-5, stroke = 4e-5;
-    const int upper = add_sphere(world, shape, 1.0, {0, 0, 1.0 - overlap}, {}, Motion::free);
-    (void)lower;
-    // Hold the upper sphere by making it heavy against the load: one long period, driven by the lower one's velocity.
-    const double normal = 2e5 * overlap, limit = 0.5 * normal;
-    world.set_external_force(upper, {0, 0, -normal}, Vec3::Zero());
-    const double dt = 1e-7;
-    const int quarter = 400;
-    const double speed = stroke / (quarter * dt);
-    double area = 0.0, peak = 0.0, last_force = 0.0, last_x = 0.0;
-    int steps = 0;
-    const auto drive = [&](int count, double sign) {
-        world.set_velocity(0, {sign * speed, 0, 0}, Vec3::Zero());
-        for (int k = 0; k < count; ++k) {
-            world.step(dt);
-            const std::vector<Contact> c = world.contacts();
-            ASSERT_EQ(c.size(), 1u);
-            const double f = c[0].first == 0 ? c[0].tangential_force.x() : -c[0].tangential_force.x();
-            const double at = world.position(0).x() - world.position(1).x();
-            if (++steps > quarter) area += 0.5 * (f + last_force) * (at - last_x);
-            peak = std::max(peak, std::abs(f));
-            last_force = f;
-            last_x = at;
-        }
-    };
-    drive(quarter, 1.0);
-    drive(2 * quarter, -1.0);
-    drive(2 * quarter, 1.0);
-    EXPECT_NEAR(peak, limit, 1e-6 * limit);
-    EXPECT_NEAR(-area / (4.0 * limit * (stroke - limit / 1e5)), 1.0, 0.01);
-}
-
-TEST(SphereContact, history_follows_the_notes_to_a_millionth_on_a_plane)
+TEST(SphereContact, friction_reversal_has_the_slope_cap_and_loop_area_of_coulomb_with_a_spring)
 {
     // Constant normal load by overlap: the plane moves along itself under a fixed-height, unspinnable (huge) sphere.
     World world = quiet_world(0.0, 0.7);
@@ -261,9 +223,9 @@ TEST(SphereContact, deep_insertion_is_relaxed_without_speed)
     add_sphere(world, shape, 2e-3, {0, 0, 0});
     add_sphere(world, shape, 2e-3, {1e-3, 0, 0});
     add_sphere(world, shape, 2e-3, {0.2e-3, 1.1e-3, 0});
-    const int used = world.relax(0.01, 500);
+    const int used = world.relax(1e-4, 500);
     EXPECT_LT(used, 500);
-    EXPECT_LT(world.statistics().max_overlap, 0.01);
+    EXPECT_LT(world.statistics().max_overlap, 1e-4);
     EXPECT_EQ(world.statistics().max_speed, 0.0);
     world.advance(5e-3);
     EXPECT_LT(world.statistics().max_speed, 0.05);

@@ -37,22 +37,20 @@ struct LoopSums {
 
 /// Normal force of the linear law with damping that never pulls:
 ///     f = max(kn delta + c v_a, 0), c = 2 zeta sqrt(m* kn)
-/// v_a is the approach speed at the end of the step, v_a = approach_half - dt f/(2 m*), so that the damping is in step with the
-/// elastic force and second order in dt.
-/// \param elastic  elastic part kn delta (times |grad Phi|) [N]
-inline double normal_force(double elastic, double approach_half, double kn, double damping, double reduced_mass, double dt, LoopSums& sums)
+/// \param elastic   elastic part kn delta (times |grad Phi|) [N]
+/// \param approach  v_a at the end of the step, foreseen with the accelerations of its start: with the velocity of the middle
+///                  the damping would lag half a step behind the spring, and stiffen it by zeta omega dt
+inline double normal_force(double elastic, double approach, double kn, double damping, double reduced_mass, double dt, LoopSums& sums)
 {
     if (damping == 0.0) return elastic;
-    const double c = 2.0 * damping * std::sqrt(reduced_mass * kn);
-    const double half = 0.5 * dt / reduced_mass;
-    const double f = (elastic + c * approach_half) / (1.0 + c * half);
-    if (f <= 0.0) {
+    const double drag = 2.0 * damping * std::sqrt(reduced_mass * kn) * approach;
+    if (elastic + drag <= 0.0) {
         // The clamp lets the spring relax without pushing: what it held is lost at the rate it relaxes.
-        sums.damping -= elastic * approach_half * dt;
+        sums.damping -= elastic * approach * dt;
         return 0.0;
     }
-    sums.damping += (f - elastic) * (approach_half - half * f) * dt;
-    return f;
+    sums.damping += drag * approach * dt;
+    return elastic + drag;
 }
 
 /// Advances a friction spring and returns the tangential force on the first body:

@@ -28,15 +28,15 @@ struct WallData {
 
 /// One-point contact of a sphere with a sphere or a wall, as the loops leave it for summation and reports.
 struct PointForce {
-    Index a, b;                 ///< b < 0: wall -1 - b
-    Vec3 normal, tangential;    ///< unit, from b to a; force on a
-    double force, overlap;      ///< normal force; depth
-    double arm_a, arm_b;        ///< distance of the contact point from the centres along the normal
+    Index a = 0, b = 0;                                       ///< b < 0: wall -1 - b
+    Vec3 normal = Vec3::Zero(), tangential = Vec3::Zero();  ///< unit, from b to a; force on a
+    double force = 0, overlap = 0;                          ///< normal force; depth
+    double arm_a = 0, arm_b = 0;                            ///< distance of the contact point from the centres along the normal
 };
 
 /// Any other contact (sphere on grid, nodes): forces and torques of both sides. points == 0: nothing touches.
 struct GeneralForce {
-    Index a, b;
+    Index a = 0, b = 0;
     std::int32_t points = 0;
     double overlap = 0;
     Vec3 normal_force = Vec3::Zero(), tangential_force = Vec3::Zero(), torque_a = Vec3::Zero(), torque_b = Vec3::Zero();
@@ -70,7 +70,8 @@ struct SphereWallList {
 /// changes its nearest wall from step to step, and each wall keeps its spring.
 struct Slots {
     static constexpr int count = 3;
-    Vec3 spring[count], normal[count];
+    Vec3 spring[count] = {Vec3::Zero(), Vec3::Zero(), Vec3::Zero()};
+    Vec3 normal[count] = {Vec3::Zero(), Vec3::Zero(), Vec3::Zero()};
     std::uint8_t used = 0, next = 0;
 };
 struct SphereGridList {
@@ -104,6 +105,7 @@ struct World::Impl {
 
     // Bodies.
     std::vector<Vec3> x, v, w, momentum;  ///< momentum: angular, world frame
+    std::vector<Vec3> v_end;              ///< velocity foreseen at the end of the step, for damping
     std::vector<Quat> q;
     std::vector<Vec3> force, torque;      ///< of contacts
     std::vector<Vec3> external_force, external_torque;
@@ -169,7 +171,7 @@ struct World::Impl {
 
     // integrate.cpp
     void check_step(double dt) const;
-    void kick(double dt);
+    void kick(double dt, bool foresee);
     void kick_with_added_mass(std::size_t i, double dt);
     void drift(double dt);
     void correct_crossings();

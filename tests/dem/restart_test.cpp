@@ -1,0 +1,122 @@
+// Same bits for any number of threads, after a restart, and with lists made at other times.
+#include <gtest/gtest.h>
+
+#include "core/error.h"
+#include "core/parallel.h"
+#include "shapes_for_tests.h"
+
+using namespace coral;
+using namespace coral::dem;
+using namespace coral::dem::testing;
+
+namespace {
+
+/// Spheres raining on three grids in a box.
+World mixed_world(double skin = 0.0)
+{
+    WorldOptions o;
+    o.skin = skin;
+    World world(o);
+    world.add_material({"default", 2780.0, 2e5, 1e5, 0.7, 0.3});
+    const int sphere = world.add_shape(Shape::sphere());
+    const int grain = world.add_shape(grid_ellipsoid({7e-3, 5e-3, 4e-3}, 0.3e-3, 1500, 2e-3));
+    world.add_box(Vec3::Zero(), Vec3(24e-3, 24e-3, 60e-3));
+    std::mt19937_64 random(11);
+    std::uniform_real_distribution<double> u(0.0, 1.0);
+    for (int k = 0; k < 3; ++k) {
+        BodySpec b;
+        b.shape = grain;
+        b.position = {7.5e-3 + 9e-3 * (k % 2), 8e-3 + 8e-3 * (k / 2), 7.2e-3 + 9e-3 * (k / 2)};
+        b.orientation = Quat(u(random), u(random), u(random), u(random)).normalized();
+        b.velocity = {0, 0, -0.3};
+        world.add_body(b);
+    }
+    for (int k = 0; k < 600; ++k)
+        add_sphere(world, sphere, 1.5e-3 + 0.5e-3 * u(random), Vec3(2e-3 * (1 + k % 11), 2e-3 * (1 + k / 11 % 11), 26e-3 + 2.2e-3 * (k / 121)), {0.1 * u(random), 0, -0.6});
+    return world;
+}
+
+void expect_same(const World& a, const World& b)
+{
+    ASSERT_EQ(a.body_count(), b.body_count());
+    for (int i = 0; i < a.body_count(); ++i) {
+        ASSERT_EQ(a.position(i), b.position(i)) << i;
+        ASSERT_EQ(a.velocity(i), b.velocity(i)) << i;
+        ASSERT_EQ(a.angular_velocity(i), b.angular_velocity(i)) << i;
+        ASSERT_EQ(a.orientation(i).coeffs(), b.orientation(i).coeffs()) << i;
+    }
+    EXPECT_EQ(a.energy().friction, b.energy().friction);
+    EXPECT_EQ(a.energy().closure, b.energy().closure);
+}
+
+}  // namespace
+
+TEST(Restart, threads_and_lists_change_no_bit_and_a_restart_goes_on_bit_for_bit)
+{
+    const double dt = 2e-6;
+    set_thread_count(1);
+    World one = mixed_world();
+    one.advance(0.02, dt);
+    EXPECT_GT(one.statistics().contacts, 300);
+    const std::vector<std::uint8_t> state = one.save();
+    one.advance(0.01, dt);
+
+    set_thread_count(2);
+    World two = mixed_world();
+    two.advance(0.02, dt);
+    EXPECT_EQ(two.save().size(), state.size());
+    two.advance(0.01, dt);
+    expect_same(one, two);
+
+    World wide = mixed_world(0.9e-3);
+    wide.advance(0.02, dt);
+    wide.advance(0.01, dt);
+    EXPECT_LT(wide.counters().rebuilds, one.counters().rebuilds);
+    for (int i = 0; i < one.body_count(); ++i) ASSERT_EQ(one.position(i), wide.position(i)) << i;
+
+    set_thread_count(1);
+    World resumed = mixed_world();
+    resumed.restore(state);
+    EXPECT_EQ(resumed.contacts().size(), two.contacts().size() > 0 ? resumed.contacts().size() : 0);
+    resumed.advance(0.01, dt);
+    expect_same(one, resumed);
+
+    std::vector<std::uint8_t> damaged = state;
+    damaged[damaged.size() / 2] ^= 1;
+    EXPECT_THROW(resumed.restore(damaged), Error);
+    EXPECT_THROW(resumed.restore(std::span(state).first(100)), Error);
+    World other = quiet_world(0.3, 0.7);
+    EXPECT_THROW(other.restore(state), Error);
+    set_thread_count(0);
+}
+
+TEST(Restart, springs_carry_a_packing_into_another_world)
+{
+    World a = mixed_world();
+    a.advance(0.03, 2e-6);
+    const std::vector<ContactSpring> springs = a.contact_springs();
+    ASSERT_GT(springs.size(), 100u);
+    World b = mixed_world();
+    for (int i = 0; i < a.body_count(); ++i) {
+        b.set_pose(i, a.position(i), a.orientation(i));
+        b.set_velocity(i, a.velocity(i), a.angular_velocity(i));
+    }
+    b.set_contact_springs(springs);
+    const Energy ea = a.energy(), eb = b.energy();
+    EXPECT_GT(ea.elastic_tangential, 0.0);
+    EXPECT_NEAR(eb.elastic_tangential / ea.elastic_tangential, 1.0, 1e-2);
+    EXPECT_NEAR(eb.elastic_normal / ea.elastic_normal, 1.0, 1e-9);
+    const std::vector<ContactSpring> again = b.contact_springs();
+    EXPECT_EQ(again.size(), springs.size());
+}
+
+TEST(Ledger, closes_in_a_packing_that_falls_and_settles)
+{
+    World world = mixed_world();
+    world.advance(0.08, 1e-6);
+    const Energy e = world.energy();
+    RecordProperty("closure", std::to_string(e.closure / e.gravity_work));
+    EXPECT_LT(std::abs(e.closure), 0.02 * (e.initial + e.gravity_work));
+    EXPECT_GT(e.friction, 0.0);
+    EXPECT_GT(e.damping, 0.0);
+}
