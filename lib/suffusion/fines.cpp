@@ -1,0 +1,104 @@
+#include "suffusion/fines.h"
+
+#include <cmath>
+
+#include "core/parallel.h"
+
+namespace coral::suffusion {
+
+using Eigen::Vector3d;
+
+Fines::Fines(const Scene& scene, const fluid::GridSpec& grid)
+    : density_(scene.description.fluid->density), viscosity_(scene.description.fluid->kinematic_viscosity),
+      law_(fluid::drag_law_from_name(scene.description.fluid->drag)), corner_(grid.origin), kernel_(grid)
+{
+    for (int axis = 0; axis < 3; ++axis)
+        if (grid.periodic(axis)) period_[axis] = grid.size()[axis];
+    for (std::size_t i = 0; i < scene.bodies.size(); ++i)
+        if (scene.bodies[i].scheme != Scheme::resolved) all_.push_back(static_cast<int>(i));
+    total_ = all_.size();
+    forces_.assign(scene.bodies.size(), Vector3d::Zero());
+    other_.assign(scene.bodies.size(), Vector3d::Zero());
+}
+
+void Fines::collect(const Scene& scene)
+{
+    ids_.clear();
+    positions_.clear();
+    velocities_.clear();
+    diameters_.clear();
+    volumes_.clear();
+    for (const int id : all_) {
+        if (!scene.world.active(id)) {
+            forces_[static_cast<std::size_t>(id)].setZero();
+            continue;
+        }
+        Vector3d x = scene.world.position(id);
+        for (int axis = 0; axis < 3; ++axis)
+            if (period_[axis] > 0) x[axis] -= period_[axis] * std::floor((x[axis] - corner_[axis]) / period_[axis]);
+        ids_.push_back(id);
+        positions_.push_back(x);
+        velocities_.push_back(scene.world.velocity(id));
+        diameters_.push_back(scene.bodies[static_cast<std::size_t>(id)].diameter);
+        volumes_.push_back(scene.bodies[static_cast<std::size_t>(id)].volume);
+    }
+    felt_.resize(ids_.size());
+    drag_.resize(ids_.size());
+    lag_.resize(ids_.size());
+    coefficients_.resize(ids_.size());
+}
+
+void Fines::deposit(fluid::Flow& flow, double dt, const Scene& scene, const fluid::Field* cell_solid)
+{
+    collect(scene);
+    kernel_.place(positions_, diameters_, cell_solid);
+    kernel_.deposit_volume(flow, volumes_, velocities_);
+    kernel_.feel(flow, felt_);
+    mean_felt_ = 0;
+    for (std::size_t i = 0; i < ids_.size(); ++i) {
+        const std::size_t id = static_cast<std::size_t>(ids_[i]);
+        const Vector3d slip = felt_[i].velocity - velocities_[i];
+        const double b = fluid::drag_coefficient(law_, felt_[i].void_fraction, slip.norm(), diameters_[i], density_, viscosity_);
+        // Drag at the velocity the body will have: linear in it, so solved at once. Stable for any dt, exact at rest and at terminal speed.
+        const bool moves = scene.world.motion(ids_[i]) == dem::Motion::free;
+        const double response = moves ? 1 / (1 + dt * b / scene.bodies[id].mass) : 1;
+        coefficients_[i] = b * response;
+        drag_[i] = coefficients_[i] * (moves ? (slip - dt * other_[id]).eval() : slip);
+        mean_felt_ += felt_[i].void_fraction / static_cast<double>(ids_.size());
+    }
+    kernel_.deposit_drag(flow, coefficients_, drag_);
+}
+
+void Fines::give_forces(const fluid::Flow& flow, double dt, Scene& scene)
+{
+    kernel_.drag_lag(flow, coefficients_, lag_);
+    drag_impulse_.setZero();
+    pressure_impulse_.setZero();
+    for (std::size_t i = 0; i < ids_.size(); ++i) {
+        const std::size_t id = static_cast<std::size_t>(ids_[i]);
+        drag_[i] += lag_[i];
+        const Vector3d pressure = -density_ * volumes_[i] * felt_[i].pressure_gradient;
+        forces_[id] = drag_[i] + pressure;
+        drag_impulse_ += dt * drag_[i];
+        pressure_impulse_ += dt * pressure;
+        scene.world.set_external_force(ids_[i], forces_[id] - density_ * volumes_[i] * scene.description.gravity, Vector3d::Zero());
+    }
+}
+
+void Fines::learn(double dt, const Scene& scene)
+{
+    for (std::size_t i = 0; i < ids_.size(); ++i) {
+        const std::size_t id = static_cast<std::size_t>(ids_[i]);
+        other_[id] = (scene.world.velocity(ids_[i]) - velocities_[i]) / dt - drag_[i] / scene.bodies[id].mass;
+    }
+}
+
+double Fines::max_speed(const Scene& scene) const
+{
+    double fastest = 0;
+    for (const int id : all_)
+        if (scene.world.active(id)) fastest = std::max(fastest, scene.world.velocity(id).norm());
+    return fastest;
+}
+
+}  // namespace coral::suffusion

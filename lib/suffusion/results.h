@@ -1,0 +1,50 @@
+#pragma once
+/// \file suffusion/results.h
+/// results.h5: what a run has measured so far. The file is rewritten whole, so it can be read at any time.
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace coral::suffusion {
+
+/// One quantity over time: `width` numbers for each row (series) or for each row and tracked body (trajectories).
+struct Column {
+    std::string name;
+    std::string unit;
+    std::size_t width = 1;
+    std::vector<double> values;
+};
+
+/// One number of /performance, with its unit.
+struct Measure {
+    std::string name;
+    std::string unit;
+    double value = 0;
+};
+
+struct Results {
+    std::vector<Column> series;           ///< /series/<name>, the first is time
+    std::vector<std::int64_t> tracked;    ///< /trajectories/id: body numbers
+    std::vector<Column> trajectories;     ///< /trajectories/<name> [nt, m(, width)]
+    std::vector<std::int64_t> fines;      ///< /migration/id
+    std::vector<double> path_length;      ///< moves summed over the outputs [m]
+    std::vector<double> net_displacement; ///< [m]
+    std::vector<std::int64_t> layer;      ///< at the start: 0 bottom, 1 middle, 2 top
+    std::vector<std::int64_t> eroded;     ///< 1 once below the filter plate
+    std::vector<Measure> performance;     ///< wall-clock values: the only part of the file that differs between two equal runs
+    std::string history;                  ///< JSON
+    std::string case_text;                ///< case.toml as read
+
+    std::size_t rows() const;
+    Column& column(const std::string& name);  ///< of the series; made when new
+    /// Drops rows from `count` on (a resumed run goes on from its checkpoint).
+    void truncate(std::size_t count);
+};
+
+/// Whole or not at all. \throws Error when the file cannot be written
+void write_results(const std::filesystem::path& file, const Results& results);
+/// \throws Error when missing, damaged or not a results file
+Results read_results(const std::filesystem::path& file);
+
+}  // namespace coral::suffusion
