@@ -22,6 +22,8 @@ struct ImmersedBodies::Body {
     bool found = false;                  ///< faces belong to `placed`
     std::array<SolidSet, 4> solid;       ///< components and cells
     std::array<std::vector<SolidRun>, 3> own_runs;  ///< runs without the faces shared with other bodies
+    Vector3d run_mass = Vector3d::Zero();                  ///< of the own runs, in faces; about `placed` like the inertia
+    Eigen::Matrix3d run_inertia = Eigen::Matrix3d::Zero();  ///< [m2]
 };
 
 struct ImmersedBodies::Shared {
@@ -202,6 +204,7 @@ void ImmersedBodies::merge()
         }
     }
     ++version_;
+    weigh();
 }
 
 double ImmersedBodies::seen_volume(std::size_t body) const
@@ -244,21 +247,39 @@ struct Carrier {
 };
 
 /// Adds r x (f e_c) for a sum of f and, along a row, of (x - x0) f.
-void add_torque(Vector3d& torque, int c, const Vector3d& r, double f, double f_times_x)
+template <int c>
+void add_torque(Vector3d& torque, const Vector3d& r, double f, double f_times_x)
 {
-    if (c == 0) torque += Vector3d(0.0, r.z() * f, -r.y() * f);
-    if (c == 1) torque += Vector3d(-r.z() * f, 0.0, r.x() * f + f_times_x);
-    if (c == 2) torque += Vector3d(r.y() * f, -(r.x() * f + f_times_x), 0.0);
+    if constexpr (c == 0) torque += Vector3d(0.0, r.z() * f, -r.y() * f);
+    if constexpr (c == 1) torque += Vector3d(-r.z() * f, 0.0, r.x() * f + f_times_x);
+    if constexpr (c == 2) torque += Vector3d(r.y() * f, -(r.x() * f + f_times_x), 0.0);
 }
 
-/// Adds the inertia of a mass that only resists motion along c.
-void add_inertia(Eigen::Matrix3d& inertia, int c, const Vector3d& r, double mass)
+/// Second moments of a mass that only resists motion along c: aa, bb, ab with a, b the axes after c.
+template <int c>
+void add_moments(Vector3d& moments, const Vector3d& r, double mass)
 {
-    const int a = (c + 1) % 3, b = (c + 2) % 3;  // velocity along c is spin_a r_b - spin_b r_a
-    inertia(a, a) += mass * r[b] * r[b];
-    inertia(b, b) += mass * r[a] * r[a];
-    inertia(a, b) -= mass * r[a] * r[b];
-    inertia(b, a) -= mass * r[a] * r[b];
+    constexpr int a = (c + 1) % 3, b = (c + 2) % 3;  // velocity along c is spin_a r_b - spin_b r_a
+    moments += mass * Vector3d(r[b] * r[b], r[a] * r[a], r[a] * r[b]);
+}
+
+template <int c>
+void add_inertia(Eigen::Matrix3d& inertia, const Vector3d& moments)
+{
+    constexpr int a = (c + 1) % 3, b = (c + 2) % 3;
+    inertia(a, a) += moments[0];
+    inertia(b, b) += moments[1];
+    inertia(a, b) -= moments[2];
+    inertia(b, a) -= moments[2];
+}
+
+/// Calls body(std::integral_constant<int, c>) for the three components.
+template <class Body>
+void for_each_component(const Body& body)
+{
+    body(std::integral_constant<int, 0>{});
+    body(std::integral_constant<int, 1>{});
+    body(std::integral_constant<int, 2>{});
 }
 
 /// w of a face with solid fraction phi  [fluid-notes, eq. 7, 8].
@@ -281,34 +302,132 @@ private:
     std::chrono::steady_clock::time_point start_;
 };
 
+/// Growth of the solid's velocity per cell along a row.
+template <int c>
+double row_slope(const Carrier& carrier)
+{
+    if constexpr (c == 1) return carrier.spin.z() * carrier.cell;
+    if constexpr (c == 2) return -carrier.spin.y() * carrier.cell;
+    return 0.0;
+}
+
+/// Number of faces and second moment of the solid rows of one component.
+template <int c>
+void weigh_runs(const std::vector<SolidRun>& runs, const Carrier& carrier, Vector3d& mass, Eigen::Matrix3d& inertia)
+{
+    Vector3d moments = Vector3d::Zero();
+    double spreads = 0.0;
+    for (const SolidRun& run : runs) {
+        const double n = run.length;
+        mass[c] += n;
+        add_moments<c>(moments, carrier.arm(c, run.i, run.j, run.k) + Vector3d(0.5 * (n - 1.0) * carrier.cell, 0.0, 0.0), n);
+        spreads += n * (n * n - 1.0) / 12.0 * carrier.cell * carrier.cell;  // about the row's own middle
+    }
+    add_inertia<c>(inertia, moments);
+    if (c == 1) inertia(2, 2) += spreads;
+    if (c == 2) inertia(1, 1) += spreads;
+}
+
 /// Reaction of the solid rows of one component; sums of (u* - u_s) eps, not yet times rho V / dt.
-void measure_runs(const Flow& flow, const std::vector<SolidRun>& runs, int c, const Carrier& carrier, FluidAction& action)
+template <int c, bool porous>
+void measure_runs(const Flow& flow, const std::vector<SolidRun>& runs, const Carrier& carrier, FluidAction& action)
 {
     const double* us = flow.provisional(c).data();
-    const bool porous = flow.porous();
-    // along the row u_s grows by this much per cell
-    const double slope = c == 0 ? 0.0 : (c == 1 ? carrier.spin.z() : -carrier.spin.y()) * carrier.cell;
+    const double* eps = porous ? flow.porous_fields().void_fraction.data() : nullptr;
+    const std::ptrdiff_t own = flow.layout().stride[c];
+    const double slope = row_slope<c>(carrier);
+    double force = 0.0;
+    Vector3d torque = Vector3d::Zero();
     for (const SolidRun& run : runs) {
         const Vector3d r = carrier.arm(c, run.i, run.j, run.k);
         const double body = carrier.component_velocity(c, r);
-        const auto eps = [&](std::ptrdiff_t l) { return porous ? flow.face_void_fraction(c, run.at + std::size_t(l)) : 1.0; };
-        const auto slip = [&](std::ptrdiff_t l) { return eps(l) * (us[run.at + std::size_t(l)] - (body + slope * double(l))); };
+        const double* row = us + run.at;
+        const auto slip = [&](std::ptrdiff_t l) {
+            const double plain = row[l] - (body + slope * double(l));
+            if constexpr (porous) return 0.5 * (eps[run.at + l] + eps[run.at + l - own]) * plain;
+            return plain;
+        };
         const double f = detail::lane_sum(run.length, slip);
-        const double fx = c == 0 ? 0.0 : detail::lane_sum(run.length, [&](std::ptrdiff_t l) { return carrier.cell * double(l) * slip(l); });
-        action.force[c] += f;
-        add_torque(action.torque, c, r, f, fx);
-        action.forced_mass[c] += porous ? detail::lane_sum(run.length, eps) : double(run.length);
-        // second moment of a row: its middle, and its own spread along x
-        const double n = run.length;
-        const Vector3d middle = r + Vector3d(0.5 * (n - 1.0) * carrier.cell, 0.0, 0.0);
-        add_inertia(action.forced_inertia, c, middle, n);
-        const double spread = n * (n * n - 1.0) / 12.0 * carrier.cell * carrier.cell;
-        if (c == 1) action.forced_inertia(2, 2) += spread;
-        if (c == 2) action.forced_inertia(1, 1) += spread;
+        const double fx = c == 0 ? 0.0 : carrier.cell * detail::lane_sum(run.length, [&](std::ptrdiff_t l) { return double(l) * slip(l); });
+        force += f;
+        add_torque<c>(torque, r, f, fx);
     }
+    action.force[c] += force;
+    action.torque += torque;
+}
+
+/// The same for cut faces, whose weights are found here.
+template <int c, bool porous>
+void measure_cuts(const Flow& flow, const ForcingOptions& options, double dt, std::vector<CutFace>& cuts, const Carrier& carrier,
+                  FluidAction& action)
+{
+    const double* us = flow.provisional(c).data();
+    const double* eps = porous ? flow.porous_fields().void_fraction.data() : nullptr;
+    const std::ptrdiff_t own = flow.layout().stride[c];
+    double force = 0.0, total = 0.0;
+    Vector3d torque = Vector3d::Zero(), moments = Vector3d::Zero();
+    for (CutFace& cut : cuts) {
+        if (cut.shared) continue;
+        const Vector3d r = carrier.arm(c, cut.i, cut.j, cut.k);
+        const double slip = us[cut.at] - carrier.component_velocity(c, r);
+        const double weight =
+            forcing_weight(options, double(cut.fraction), slip, dt, flow.options().kinematic_viscosity, carrier.cell);
+        cut.weight = float(weight);
+        double mass = double(cut.weight);
+        if constexpr (porous) mass *= 0.5 * (eps[cut.at] + eps[std::ptrdiff_t(cut.at) - own]);
+        force += mass * slip;
+        total += mass;
+        add_torque<c>(torque, r, mass * slip, 0.0);
+        add_moments<c>(moments, r, mass);
+    }
+    action.force[c] += force;
+    action.torque += torque;
+    action.forced_mass[c] += total;
+    add_inertia<c>(action.forced_inertia, moments);
+}
+
+/// u* <- u* + w (u_s - u*) on the faces of one component. \returns the sum of eps times the change
+template <int c, bool porous>
+double force_faces(Flow& flow, const std::vector<SolidRun>& runs, const std::vector<CutFace>& cuts, const Carrier& carrier)
+{
+    double* us = flow.provisional(c).data();
+    const double* eps = porous ? flow.porous_fields().void_fraction.data() : nullptr;
+    const std::ptrdiff_t own = flow.layout().stride[c];
+    const double slope = row_slope<c>(carrier);
+    double impulse = 0.0;
+    for (const SolidRun& run : runs) {
+        const double solid = carrier.component_velocity(c, carrier.arm(c, run.i, run.j, run.k));
+        double* row = us + run.at;
+        impulse += detail::lane_sum(run.length, [&](std::ptrdiff_t l) {
+            const double change = solid + slope * double(l) - row[l];
+            if constexpr (porous) return 0.5 * (eps[run.at + l] + eps[run.at + l - own]) * change;
+            return change;
+        });
+        for (int l = 0; l < run.length; ++l) row[l] = solid + slope * l;
+    }
+    for (const CutFace& cut : cuts) {
+        if (cut.shared) continue;
+        const double solid = carrier.component_velocity(c, carrier.arm(c, cut.i, cut.j, cut.k));
+        const double change = double(cut.weight) * (solid - us[cut.at]);
+        us[cut.at] += change;
+        impulse += (porous ? 0.5 * (eps[cut.at] + eps[std::ptrdiff_t(cut.at) - own]) : 1.0) * change;
+    }
+    return impulse;
 }
 
 }  // namespace
+
+/// What the solid rows resist with; it does not change from step to step.
+void ImmersedBodies::weigh()
+{
+    parallel_blocks(bodies_.size(), 1, [&](std::size_t b, std::size_t) {
+        Body& body = *bodies_[b];
+        const Carrier carrier(grid_, body.placed, body.placed);
+        body.run_mass.setZero();
+        body.run_inertia.setZero();
+        for_each_component([&](auto component) { weigh_runs<component>(body.own_runs[component], carrier, body.run_mass, body.run_inertia); });
+    });
+}
 
 /// Velocity of the solid on a shared face: mean of the bodies weighted by their fractions.
 double ImmersedBodies::shared_velocity(const Shared& shared, std::span<const RigidMotion> motions) const
@@ -324,41 +443,43 @@ double ImmersedBodies::shared_velocity(const Shared& shared, std::span<const Rig
 std::span<const FluidAction> ImmersedBodies::measure(Flow& flow, double dt, std::span<const RigidMotion> motions)
 {
     const Stopwatch watch(flow.times().forcing);
-    const double nu = flow.options().kinematic_viscosity, cell = grid_.cell;
-    const auto face_action = [&](FluidAction& action, int c, const Vector3d& r, double mass, double slip) {
-        action.force[c] += mass * slip;
-        add_torque(action.torque, c, r, mass * slip, 0.0);
-        action.forced_mass[c] += mass;
-        add_inertia(action.forced_inertia, c, r, mass);
-    };
-    parallel_blocks(bodies_.size(), 1, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t b = begin; b < end; ++b) {
-            Body& body = *bodies_[b];
-            const Carrier carrier(grid_, body.placed, motions[b]);
-            FluidAction action;
-            for (int c = 0; c < 3; ++c) {
-                measure_runs(flow, body.own_runs[c], c, carrier, action);
-                const double* us = flow.provisional(c).data();
-                for (CutFace& cut : body.solid[c].cuts) {
-                    if (cut.shared) continue;
-                    const Vector3d r = carrier.arm(c, cut.i, cut.j, cut.k);
-                    const double slip = us[cut.at] - carrier.component_velocity(c, r);
-                    cut.weight = float(forcing_weight(options_, double(cut.fraction), slip, dt, nu, cell));
-                    face_action(action, c, r, double(cut.weight) * flow.face_void_fraction(c, cut.at), slip);
-                }
+    parallel_blocks(bodies_.size(), 1, [&](std::size_t b, std::size_t) {
+        Body& body = *bodies_[b];
+        const Carrier carrier(grid_, body.placed, motions[b]);
+        FluidAction action;
+        action.forced_mass = body.run_mass;
+        action.forced_inertia = body.run_inertia;
+        for_each_component([&](auto component) {
+            constexpr int c = component;
+            if (flow.porous()) {
+                measure_runs<c, true>(flow, body.own_runs[c], carrier, action);
+                measure_cuts<c, true>(flow, options_, dt, body.solid[c].cuts, carrier, action);
+            } else {
+                measure_runs<c, false>(flow, body.own_runs[c], carrier, action);
+                measure_cuts<c, false>(flow, options_, dt, body.solid[c].cuts, carrier, action);
             }
-            actions_[b] = action;
-        }
+        });
+        actions_[b] = action;
     });
     for (Shared& shared : shared_) {
-        const int c = shared.component;
-        const double slip = flow.provisional(c)[shared.at] - shared_velocity(shared, motions);
-        shared.weight = forcing_weight(options_, shared.fraction, slip, dt, nu, cell);
-        for (const Shared::Share& share : shared.shares) {
-            const Carrier carrier(grid_, bodies_[share.body]->placed, motions[share.body]);
-            face_action(actions_[share.body], c, carrier.arm(c, share.i, share.j, share.k),
-                        share.part * shared.weight * flow.face_void_fraction(c, shared.at), slip);
-        }
+        for_each_component([&](auto component) {
+            constexpr int c = component;
+            if (shared.component != c) return;
+            const double slip = flow.provisional(c)[shared.at] - shared_velocity(shared, motions);
+            shared.weight = forcing_weight(options_, shared.fraction, slip, dt, flow.options().kinematic_viscosity, grid_.cell);
+            for (const Shared::Share& share : shared.shares) {
+                const Carrier carrier(grid_, bodies_[share.body]->placed, motions[share.body]);
+                const Vector3d r = carrier.arm(c, share.i, share.j, share.k);
+                const double part = share.part * shared.weight * flow.face_void_fraction(c, shared.at);
+                FluidAction& action = actions_[share.body];
+                Vector3d moments = Vector3d::Zero();
+                action.force[c] += part * slip;
+                action.forced_mass[c] += part;
+                add_torque<c>(action.torque, r, part * slip, 0.0);
+                add_moments<c>(moments, r, part);
+                add_inertia<c>(action.forced_inertia, moments);
+            }
+        });
     }
     const double mass = flow.options().density * grid_.cell_volume();
     for (FluidAction& action : actions_) {
@@ -373,45 +494,30 @@ std::span<const FluidAction> ImmersedBodies::measure(Flow& flow, double dt, std:
 void ImmersedBodies::apply(Flow& flow, std::span<const RigidMotion> motions)
 {
     const Stopwatch watch(flow.times().forcing);
-    const auto one = [](std::size_t) { return 1.0; };
-    const auto force_all = [&](auto&& eps_of) {
-        return parallel_sum(bodies_.size(), 1, Vector3d(0.0, 0.0, 0.0), [&](std::size_t b, std::size_t) {
-            const Body& body = *bodies_[b];
-            const Carrier carrier(grid_, body.placed, motions[b]);
-            Vector3d impulse = Vector3d::Zero();
-            for (int c = 0; c < 3; ++c) {
-                double* us = flow.provisional(c).data();
-                const double slope = c == 0 ? 0.0 : (c == 1 ? carrier.spin.z() : -carrier.spin.y()) * carrier.cell;
-                const auto eps = eps_of(c);
-                for (const SolidRun& run : body.own_runs[c]) {
-                    const double solid = carrier.component_velocity(c, carrier.arm(c, run.i, run.j, run.k));
-                    impulse[c] += detail::lane_sum(run.length, [&](std::ptrdiff_t l) {
-                        const std::size_t at = run.at + std::size_t(l);
-                        return eps(at) * (solid + slope * double(l) - us[at]);
-                    });
-                    for (int l = 0; l < run.length; ++l) us[run.at + std::uint32_t(l)] = solid + slope * l;
-                }
-                for (const CutFace& cut : body.solid[c].cuts) {
-                    if (cut.shared) continue;
-                    const double solid = carrier.component_velocity(c, carrier.arm(c, cut.i, cut.j, cut.k));
-                    const double change = double(cut.weight) * (solid - us[cut.at]);
-                    us[cut.at] += change;
-                    impulse[c] += eps(cut.at) * change;
-                }
-            }
-            return impulse;
+    const double mass = flow.options().density * grid_.cell_volume();
+    impulses_.resize(bodies_.size());
+    Vector3d impulse = parallel_sum(bodies_.size(), 1, Vector3d(0.0, 0.0, 0.0), [&](std::size_t b, std::size_t) {
+        const Body& body = *bodies_[b];
+        const Carrier carrier(grid_, body.placed, motions[b]);
+        Vector3d part = Vector3d::Zero();
+        for_each_component([&](auto component) {
+            constexpr int c = component;
+            part[c] = flow.porous() ? force_faces<c, true>(flow, body.own_runs[c], body.solid[c].cuts, carrier)
+                                    : force_faces<c, false>(flow, body.own_runs[c], body.solid[c].cuts, carrier);
         });
-    };
-    Vector3d impulse = flow.porous() ? force_all([&](int c) { return [&flow, c](std::size_t at) { return flow.face_void_fraction(c, at); }; })
-                                     : force_all([&](int) { return one; });
+        impulses_[b] = mass * part;
+        return part;
+    });
     for (const Shared& shared : shared_) {
         const int c = shared.component;
         double& us = flow.provisional(c)[shared.at];
         const double change = shared.weight * (shared_velocity(shared, motions) - us);
         us += change;
-        impulse[c] += flow.face_void_fraction(c, shared.at) * change;
+        const double given = flow.face_void_fraction(c, shared.at) * change;
+        impulse[c] += given;
+        for (const Shared::Share& share : shared.shares) impulses_[share.body][c] += mass * share.part * given;
     }
-    flow.add_forcing_impulse(flow.options().density * grid_.cell_volume() * impulse);
+    flow.add_forcing_impulse(mass * impulse);
 }
 
 }  // namespace coral::fluid

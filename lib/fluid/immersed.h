@@ -75,6 +75,8 @@ public:
 
     /// u* <- u* + w (u_s - u*) with the motions at the end of the contact steps [eq. 7]; books the impulse in the flow's tally.
     void apply(Flow& flow, std::span<const RigidMotion> motions);
+    /// What apply() gave the fluid on behalf of each body [N s]: their sum is the impulse booked in the flow's tally.
+    std::span<const Eigen::Vector3d> impulses() const { return impulses_; }
 
     /// Solid fraction of cells, overlaps clipped at 1, padded like a field of the flow, ghosts 0.
     const Field& cell_solid_fraction() const { return cell_solid_; }
@@ -96,6 +98,7 @@ private:
 
     void rasterise(Body& body) const;
     void merge();
+    void weigh();
     double shared_velocity(const Shared& shared, std::span<const RigidMotion> motions) const;
 
     GridSpec grid_;
@@ -104,6 +107,7 @@ private:
     std::vector<std::unique_ptr<Body>> bodies_;
     std::vector<Shared> shared_;
     std::vector<FluidAction> actions_;
+    std::vector<Eigen::Vector3d> impulses_;
     std::array<Field, 3> face_solid_;
     Field cell_solid_;
     std::uint64_t version_ = 0;

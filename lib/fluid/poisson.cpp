@@ -8,17 +8,13 @@
 #include <numbers>
 
 #include "core/parallel.h"
+#include "fluid/detail/cosine_planes.h"
 
 namespace coral::fluid {
 
 namespace {
 
-/// FFTW's planner keeps global state.
-std::mutex& planner_mutex()
-{
-    static std::mutex mutex;
-    return mutex;
-}
+using detail::planner_mutex;
 
 /// What diagonalises the second difference along one axis.
 struct Transform {
@@ -75,7 +71,7 @@ struct Plan {
     }
 };
 
-constexpr std::size_t planes_per_block = 4;
+constexpr std::size_t planes_per_block = 4;  // even: planes are transformed in pairs
 constexpr std::size_t rows_per_block = 4;
 
 }  // namespace
@@ -89,9 +85,10 @@ struct Poisson::Impl {
     bool periodic_t = false, singular = false;
     double low_end = 0.0, high_end = 0.0;  ///< added to the diagonal at the two ends
     Plan forward, backward, forward_t, backward_t;
+    std::unique_ptr<detail::CosinePlanes> cosine;  ///< when both transforms are cosine ones
 
     explicit Impl(const GridSpec& g);
-    void transform_planes(Field& f, const Plan& plan) const;
+    void transform_planes(Field& f, bool forth) const;
     void transform_t(Field& f, const Plan& plan) const;
     void divide(Field& f) const;
     void tridiagonal(Field& f) const;
@@ -114,6 +111,7 @@ Poisson::Impl::Impl(const GridSpec& g) : grid(g)
     high_end = g.outlet(t_axis, 1) ? -1.0 : 1.0;
     singular = std::none_of(g.boundary.begin(), g.boundary.end(),
                             [](const Boundary& side) { return side.kind == BoundaryKind::outlet; });
+    if (a.forward == FFTW_REDFT10 && b.forward == FFTW_REDFT10) cosine = std::make_unique<detail::CosinePlanes>(na, nb);
     const std::lock_guard lock(planner_mutex());
     Field sample(plane_ab * (periodic_t ? nt : 1));
     const int n0 = int(nb), n1 = int(na), n2 = int(nt);
@@ -129,10 +127,20 @@ Poisson::Impl::Impl(const GridSpec& g) : grid(g)
     backward_t.plan = along_t(t.backward);
 }
 
-void Poisson::Impl::transform_planes(Field& f, const Plan& plan) const
+void Poisson::Impl::transform_planes(Field& f, bool forth) const
 {
+    const fftw_plan plan = forth ? forward.plan : backward.plan;
     parallel_blocks(nt, planes_per_block, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t p = begin; p < end; ++p) fftw_execute_r2r(plan.plan, f.data() + p * plane_ab, f.data() + p * plane_ab);
+        for (std::size_t p = begin; p < end; p += cosine ? 2 : 1) {
+            double* first = f.data() + p * plane_ab;
+            double* second = p + 1 < end ? first + plane_ab : nullptr;
+            if (!cosine)
+                fftw_execute_r2r(plan, first, first);
+            else if (forth)
+                cosine->forward(first, second);
+            else
+                cosine->backward(first, second);
+        }
     });
 }
 
@@ -245,7 +253,7 @@ void Poisson::solve(Field& work, Field& scratch) const
         s.transpose(work, scratch, true);
     }
     Field& f = turned ? scratch : work;
-    s.transform_planes(f, s.forward);
+    s.transform_planes(f, true);
     if (s.periodic_t) {
         s.transform_t(f, s.forward_t);
         s.divide(f);
@@ -253,7 +261,7 @@ void Poisson::solve(Field& work, Field& scratch) const
     } else {
         s.tridiagonal(f);
     }
-    s.transform_planes(f, s.backward);
+    s.transform_planes(f, false);
     if (turned) s.transpose(scratch, work, false);
 }
 

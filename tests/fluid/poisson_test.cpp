@@ -120,3 +120,14 @@ TEST(Poisson, gives_the_same_bits_with_one_and_two_threads)
     poisson.solve(two, scratch);
     EXPECT_EQ(one, two);
 }
+
+TEST(Poisson, is_exact_for_odd_even_and_single_cells_across_the_planes)
+{
+    for (const Eigen::Vector3i& cells : {Eigen::Vector3i(1, 1, 5), Eigen::Vector3i(2, 3, 7), Eigen::Vector3i(5, 4, 6), Eigen::Vector3i(7, 1, 9)}) {
+        GridSpec grid;
+        grid.cells = cells;
+        grid.cell = 0.2;
+        grid.boundary[z_plus].kind = BoundaryKind::outlet;
+        EXPECT_LT(round_trip_error(grid, 3), 1e-12) << cells.transpose();
+    }
+}
