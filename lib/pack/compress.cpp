@@ -13,7 +13,7 @@ namespace coral::pack::detail {
 namespace {
 
 constexpr int steps_between_checks = 50;  ///< walls keep their velocity in between
-constexpr double servo_steps = 500;       ///< time constant of the servo, about one passage of a wave through the sample [steps]
+constexpr double lid_first = 0.05;        ///< side walls wait until the lid carries this share of the pressure
 constexpr double deepest_overlap = 0.25;  ///< of the smaller radius; beyond it grains have lost their shape
 
 /// What the stop rules look at.
@@ -54,13 +54,21 @@ double axis_pressure(const dem::World& world, const Box& box, int axis)
 }
 
 /// Servo of one pair of walls: closing speed of each wall [m/s] from the missing pressure.
-/// The stiffness of the sample between the walls is that of its wall contacts in parallel, K_w, in series over L/s layers with
-/// s = sqrt(A/n) the spacing of those contacts: K = K_w s/L. Twice that keeps the servo slower than the sample.
-double servo_speed(double missing, double area, double gap, int wall_contacts, double stiffness, double dt, double limit)
+/// The stiffness of the sample between the walls is that of its wall contacts in parallel, K_w, in series over n = gap/s layers with
+/// s = sqrt(A/contacts) the spacing of those contacts: K = K_w/n. The time constant is 2 sqrt(M/K): slower than the sample's own motion.
+double servo_speed(double missing, double area, double gap, int wall_contacts, double stiffness, double mass, double limit)
 {
-    const double spacing = std::sqrt(area / std::max(wall_contacts, 1));
-    const double k = 2 * std::max(wall_contacts, 1) * stiffness * std::min(spacing / gap, 1.0);
-    return std::clamp(missing * area / (k * servo_steps * dt), -limit, limit);
+    const int contacts = std::max(wall_contacts, 1);
+    const double layers = std::max(gap / std::sqrt(area / contacts), 1.0);
+    const double k = contacts * stiffness / layers;
+    return std::clamp(missing * area / (2 * std::sqrt(k * mass)), -limit, limit);
+}
+
+double total_mass(const dem::World& world)
+{
+    double sum = 0;
+    for (int i = 0; i < world.body_count(); ++i) sum += world.mass(i);
+    return sum;
 }
 
 void set_pair_speed(dem::World& world, const Box& box, int axis, double speed, bool both)
@@ -102,9 +110,9 @@ void set_frictions(dem::World& world, const Spec& spec, double friction)
 bool to_pressure(dem::World& world, const Box& box, const Spec& spec)
 {
     const Compression& rule = spec.compression;
-    const double dt = step_of(world, spec), start = world.time(), kn = stiffest(spec);
+    const double dt = step_of(world, spec), start = world.time(), kn = stiffest(spec), mass = total_mass(world);
     set_frictions(world, spec, rule.friction);
-    bool own_friction = rule.friction < 0;
+    bool own_friction = rule.friction < 0, lid_touches = false;
     Progress progress("compressing", 1);
     while (world.time() - start < rule.time_limit) {
         const Eigen::Vector3d size = box.upper(world) - box.lower(world);
@@ -117,9 +125,10 @@ bool to_pressure(dem::World& world, const Box& box, const Spec& spec)
             const double missing = rule.pressure - p;
             worst = std::max(worst, std::abs(missing) / rule.pressure);
             mean += p / (3 - first_axis);
-            const int touching = std::max(contacts[std::size_t(2 * axis)], contacts[std::size_t(2 * axis + 1)]);
-            set_pair_speed(world, box, axis,
-                           servo_speed(missing, size.prod() / size[axis], size[axis], touching, kn, dt, rule.max_velocity), rule.lateral);
+            const int touching = std::min(contacts[std::size_t(2 * axis)], contacts[std::size_t(2 * axis + 1)]);
+            lid_touches = lid_touches || box.pressure(world, 5) > lid_first * rule.pressure;
+            set_pair_speed(world, box, axis, axis < 2 && !lid_touches ? 0.0 :
+                           servo_speed(missing, size.prod() / size[axis], size[axis], touching, kn, mass, rule.max_velocity), rule.lateral);
         }
         step_some(world, dt, rule.drag);
         const State s = state_of(world);
@@ -157,7 +166,7 @@ bool to_void_ratio(dem::World& world, const Box& box, const Spec& spec, double a
         }
         // relative closing rate of every moving edge; the last part takes a few hundred steps
         const double edges = rule.lateral ? 3 : 1;
-        const double rate = std::min(2 * rule.max_velocity / (rule.lateral ? size.maxCoeff() : size.z()), excess / (edges * servo_steps * dt));
+        const double rate = std::min(2 * rule.max_velocity / (rule.lateral ? size.maxCoeff() : size.z()), excess / (edges * 500 * dt));
         for (int axis = rule.lateral ? 0 : 2; axis < 3; ++axis) set_pair_speed(world, box, axis, 0.5 * rate * size[axis], rule.lateral);
         step_some(world, dt, rule.drag);
         const State s = state_of(world);

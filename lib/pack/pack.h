@@ -29,7 +29,7 @@ struct PackReport {
 ///    turned at random, and falls. Contacts are softened by `stiffness_factor`, friction and damping are those of [dropping], and
 ///    velocities decay at the rate `drag`: this only shortens the settling.
 /// 3. A new world with the true stiffness takes the grains over, overlaps relaxed. The walls close in until the target is met: each pair
-///    moves with v = (p - p_mean) A / (K tau), at most max_velocity, where K is the summed stiffness of its contacts and tau a hundred steps.
+///    moves with v = (p - p_mean) A / (K tau), at most max_velocity, where K is the sample's stiffness and tau its own time.
 /// 4. Walls stand still, friction is the material's, and the sample comes to rest under its gravity.
 /// 5. The lower corner of the box is shifted to the origin; contacts, springs, gradation, criteria and statistics are stored.
 /// Walls are smooth throughout.

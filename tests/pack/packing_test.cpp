@@ -32,10 +32,10 @@ Spec spec_of(const std::string& text)
     return read_spec(scratch("spec.toml"));
 }
 
-/// 60 spheres of 2 mm in a box of 8 x 8 mm, pressed at 5 kPa.
+/// 60 spheres of about 2 mm in a box of 8 x 8 mm, pressed at 5 kPa.
 const std::string spheres =
     "[box]\nsize = [\"8mm\", \"8mm\", \"12mm\"]\n"
-    "[[population]]\nrole = \"coarse\"\ndiameter = \"2mm\"\ncount = 60\n"
+    "[[population]]\nrole = \"coarse\"\ndiameters = [\"1.7mm\", \"2.3mm\"]\ncount = 60\n"
     "[material.default]\nnormal_stiffness = 2e4\ntangential_stiffness = 1e4\nfriction = 0.3\n"
     "[compression]\npressure = \"5kPa\"\n";
 
