@@ -148,7 +148,7 @@ ApparentShape close_with_ball(const Mask& solid, double radius)
     if (out.filled > out.solid) out.void_count = count_voids(closing, voids, open_void);
     if (out.open_void > 0) {
         const double b = widest_constriction(closing, open_void);
-        if (b > 0) out.largest_throat = (2.0 * b - 1.0) * mean_edge(solid);
+        out.largest_throat = 2.0 * b * mean_edge(solid);
     }
     out.apparent = crop_margin(solid, apparent, closing.box.size, closing.margin);
     return out;

@@ -21,8 +21,9 @@ struct ApparentShape {
 ///     d(x) = distance to the solid;   E = part of {d >= R + c/2} connected to the border;   q(x) = distance to E
 ///     apparent = {q > R + c/2} or solid
 /// with c the geometric mean of the voxel edges. Closed voids and voids behind throats narrower than 2R fill.
-/// The largest throat follows from b(x) = max over paths from outside of the least d on the path: it is 2 b - c, the largest
-/// over voids that widen behind the constriction (d > b + c). Voids behind throats wider than 2R are outside and not seen.
+/// The largest throat follows from b(x) = max over paths from outside of the least d on the path: it is 2 b, the largest
+/// over voids that widen behind the constriction (d > b + c). Round throats are met within c: the widest ball sits on a voxel
+/// centre, which costs about what the half voxel from solid centre to solid face gives. Voids behind throats wider than 2R are outside and not seen.
 /// \param radius  of the ball [m]
 ApparentShape close_with_ball(const Mask& solid, double radius);
 

@@ -24,7 +24,7 @@ double wadell_roundness(const Mask& mask, double diameter)
 {
     const double inscribed = inscribed_radius(mask);
     double area = 0, sum = 0;
-    for (const CurvatureSample& s : surface_curvature(mask, diameter / 40.0)) {
+    for (const CurvatureSample& s : surface_curvature(mask, std::max(diameter / 30.0, 2.5 * mask.voxel_size.maxCoeff()))) {
         if (s.largest_curvature * inscribed <= 1.0) continue;
         area += s.area;
         sum += s.area / (s.largest_curvature * inscribed);

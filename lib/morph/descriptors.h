@@ -32,7 +32,7 @@ struct Descriptors {
 /// Areas: surface of the occupancy smoothed by 0.7 voxel. Roundness after Wadell in three dimensions: the area-weighted mean,
 /// over the corners of the surface, of corner radius over inscribed radius,
 ///     sum_i A_i (1/k_i) / (R_in sum_i A_i),   k_i = largest principal curvature > 1/R_in,
-/// with curvatures taken at the scale max(D/40, 1.5 voxels) and R_in the largest inscribed ball; 1 when there are no corners.
+/// with curvatures taken at the scale max(D/30, 2.5 voxels) and R_in the largest inscribed ball; 1 when there are no corners.
 /// \param solid     one grain, islands removed
 /// \param apparent  its closing
 Descriptors measure(const Mask& solid, const ApparentShape& apparent);

@@ -23,7 +23,8 @@ HullProperties hull_properties(std::span<const Eigen::Vector3d> points)
     for (const Eigen::Vector3d& p : points) cloud.emplace_back(p.x(), p.y(), p.z());
     CGAL::Surface_mesh<Point> hull;
     if (cloud.size() >= 4) CGAL::convex_hull_3(cloud.begin(), cloud.end(), hull);
-    if (hull.number_of_faces() < 4) throw Error("convex hull", "the points lie in one plane");
+    const auto refuse = [] { throw Error("convex hull", "the points lie in one plane"); };
+    if (hull.number_of_faces() < 4) refuse();
 
     HullProperties out;
     const Point reference = *hull.points().begin();
@@ -36,7 +37,12 @@ HullProperties hull_properties(std::span<const Eigen::Vector3d> points)
         out.volume += CGAL::to_double(CGAL::volume(reference, t[0], t[1], t[2]));
     }
     out.volume = std::abs(out.volume);
-    for (const auto v : hull.vertices()) corners.push_back(hull.point(v));
+    double span = 0;
+    for (const auto v : hull.vertices()) {
+        corners.push_back(hull.point(v));
+        span = std::max(span, std::sqrt(CGAL::squared_distance(reference, corners.back())));
+    }
+    if (out.volume <= 1e-9 * span * span * span) refuse();  // a flat set may come as a body of two sides
 
     // The search for the box is random inside; a fixed seed makes it the same for every grain order and thread.
     CGAL::get_default_random() = CGAL::Random(0);
