@@ -14,7 +14,7 @@ constexpr double sigmoid = 100.0;  ///< c of the potential [notes, section 2]
 struct Field {
     const sdf::DistanceGrid* grid = nullptr;
     const WallData* wall = nullptr;
-    Quat rotation = Quat::Identity();
+    Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  ///< grid to world
     Vec3 centre = Vec3::Zero();  ///< of the grid, nearest image to the slave
     double scale = 1.0;
 
@@ -23,7 +23,7 @@ struct Field {
     {
         if (grid) {
             Vec3 local;
-            const double d = scale * grid->sample_with_gradient(rotation.conjugate() * (p - centre) / scale, local);
+            const double d = scale * grid->sample_with_gradient(rotation.transpose() * (p - centre) / scale, local);
             gradient = rotation * local;
             return d;
         }
@@ -60,7 +60,7 @@ void World::Impl::node_loop(double dt)
                 const std::size_t b = std::size_t(master);
                 to_b = periodic(x[a] - x[b]);
                 field.grid = &shapes[std::size_t(shape[b])]->distance_grid();
-                field.rotation = q[b];
+                field.rotation = q[b].toRotationMatrix();
                 field.centre = x[a] - to_b;
                 field.scale = scale[b];
                 master_inverse_mass = inverse_mass[b];
@@ -82,9 +82,11 @@ void World::Impl::node_loop(double dt)
             const double share = l.share[p];
             const double stiffness = share * pair.kn * inverse_radius / (2.0 * EIGEN_PI) * scale[a] * scale[a];
             const double inverse_length = sigmoid / (2.0 * std::min(equivalent[a], reach_b));
+            const Eigen::Matrix3d rotation = scale[a] * q[a].toRotationMatrix();
             double total = 0.0;
             for (Index k = l.start[p]; k < l.start[p + 1]; ++k) {
-                const Vec3 arm = q[a] * (scale[a] * surface.nodes()[std::size_t(l.node[k])]);
+                const Vec3 arm = rotation * surface.nodes()[std::size_t(l.node[k])];
+                l.arm[k] = arm;
                 const double depth = -field(x[a] + arm, l.gradient[k]);
                 l.depth[k] = depth;
                 l.force[k] = 0.0;
@@ -109,7 +111,7 @@ void World::Impl::node_loop(double dt)
                 }
                 const double weight = l.force[k] * inverse_total, slope = l.gradient[k].norm();
                 const Vec3 n = slope < 1e-9 ? Vec3::UnitZ() : Vec3(l.gradient[k] / slope);
-                const Vec3 arm = q[a] * (scale[a] * surface.nodes()[std::size_t(l.node[k])]);
+                const Vec3& arm = l.arm[k];
                 const Vec3 relative = v_end[a] + w[a].cross(arm) - end_b - spin_b.cross(to_b + arm);
                 double fn = l.force[k] * slope;
                 if (pair.damping > 0.0 && weight > 0.0) {
@@ -124,7 +126,7 @@ void World::Impl::node_loop(double dt)
                 if (l.depth[k] <= 0.0) continue;
                 const double slope = l.gradient[k].norm();
                 const Vec3 n = slope < 1e-9 ? Vec3::UnitZ() : Vec3(l.gradient[k] / slope);
-                const Vec3 arm = q[a] * (scale[a] * surface.nodes()[std::size_t(l.node[k])]);
+                const Vec3& arm = l.arm[k];
                 const Vec3 relative = v[a] + w[a].cross(arm) - velocity_b - spin_b.cross(to_b + arm);
                 const Vec3 slide = relative - n.dot(relative) * n;
                 const double weight = normal_total > 0.0 ? l.force[k] / normal_total : 0.0;

@@ -99,8 +99,11 @@ void make_sphere_grid_list(World::Impl& world, const std::vector<BroadPair>& pai
         const Shape& shape = *world.shapes[std::size_t(world.shape[j])];
         const Vec3 local = world.q[j].conjugate() * world.periodic(world.x[i] - world.x[j]);
         const double scale = world.scale[j], within = world.radius[i] + skin;
-        if (scale * shape.distance_grid().sample(local / scale) >= within) continue;
-        if (scale * shape.exterior_reach() < world.radius[i])
+        const sdf::DistanceGrid& field = shape.distance_grid();
+        const double distance = scale * field.sample(local / scale);
+        if (distance >= within) continue;
+        // In a void the table answers for any radius; beyond its box, or where it is clamped, only out to its reach.
+        if (scale * shape.exterior_reach() < world.radius[i] && (!field.inside_box(local / scale) || distance >= scale * field.outside_limit))
             throw Error(world.name(i) + " at " + world.name(j),
                         "radius " + to_text(world.radius[i]) + " m is larger than the exterior distances of " + shape.name() + " reach (" +
                             to_text(scale * shape.exterior_reach()) + " m)",
@@ -123,10 +126,11 @@ void append_nodes(const World::Impl& world, Index slave, double skin, const Dist
     const std::size_t a = std::size_t(slave);
     const Shape& shape = *world.shapes[std::size_t(world.shape[a])];
     const double scale = world.scale[a];
+    const Eigen::Matrix3d rotation = scale * world.q[a].toRotationMatrix();
     for (const Shape::Cluster& cluster : shape.clusters()) {
-        if (distance(world.q[a] * (scale * cluster.centre)) > 1.05 * scale * cluster.radius + skin) continue;
+        if (distance(rotation * cluster.centre) > 1.05 * scale * cluster.radius + skin) continue;
         for (int n = cluster.begin; n < cluster.end; ++n)
-            if (distance(world.q[a] * (scale * shape.nodes()[std::size_t(n)])) < skin) found.push_back(n);
+            if (distance(rotation * shape.nodes()[std::size_t(n)]) < skin) found.push_back(n);
     }
 }
 
@@ -137,10 +141,10 @@ void append_pair(const World::Impl& world, const NodeList& old, NodeList& l, Ind
     if (master >= 0) {
         const std::size_t b = std::size_t(master);
         const Vec3 to_b = world.periodic(world.x[a] - world.x[b]);
-        const Quat inverse = world.q[b].conjugate();
         const double scale = world.scale[b];
+        const Eigen::Matrix3d to_local = world.q[b].toRotationMatrix().transpose() / scale;
         const sdf::DistanceGrid& field = world.shapes[std::size_t(world.shape[b])]->distance_grid();
-        append_nodes(world, slave, skin, [&](const Vec3& arm) { return scale * field.sample(inverse * (to_b + arm) / scale); }, l.node);
+        append_nodes(world, slave, skin, [&](const Vec3& arm) { return scale * field.sample(to_local * (to_b + arm)); }, l.node);
     } else {
         const WallData& wall = world.walls[std::size_t(-1 - master)];
         if (wall.kind == WallData::Kind::plane) {
@@ -206,6 +210,7 @@ void make_node_list(World::Impl& world, const std::vector<BroadPair>& pairs, dou
     l.start.push_back(0);
     for (const Directed& d : directed) append_pair(world, old, l, d.slave, d.master, skin, d.share);
     l.gradient.resize(l.node.size(), Vec3::Zero());
+    l.arm.resize(l.node.size(), Vec3::Zero());
     l.force.resize(l.node.size());
     l.depth.resize(l.node.size());
     l.out.resize(l.slave.size());

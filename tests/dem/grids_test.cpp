@@ -101,19 +101,19 @@ TEST(NodeContact, force_does_not_grow_with_the_number_of_nodes)
         const int b = add_grid(world, shape, Vec3(1, 0, 0));
         std::mt19937_64 random(2);
         double sum = 0.0;
-        for (int k = 0; k < 40; ++k) {
+        for (int k = 0; k < 24; ++k) {
             // The second body pushed against the first until its deepest node is 100 um deep.
             const Vec3 u = random_direction(random);
             const Quat q = random_turn(random);
             double low = 0.0, high = 16e-3;
-            for (int it = 0; it < 24; ++it) {
+            for (int it = 0; it < 14; ++it) {
                 const double at = 0.5 * (low + high);
                 double depth = 0.0;
                 for (const Vec3& n : world.shape(b).nodes()) depth = std::max(depth, -world.shape(0).distance(at * u + q * n));
                 (depth > 1e-4 ? low : high) = at;
             }
             world.set_pose(b, 0.5 * (low + high) * u, q);
-            for (const Contact& c : world.contacts()) sum += c.normal_force.norm() / 40.0;
+            for (const Contact& c : world.contacts()) sum += c.normal_force.norm() / 24.0;
         }
         mean.push_back(sum);
     }
@@ -161,20 +161,13 @@ TEST(NodeContact, grid_on_a_plane_rests_and_sticks_or_slides_by_its_friction)
     for (const auto& [angle, slides] : {std::pair{0.25, false}, std::pair{0.75, true}}) {
         World world = quiet_world(0.3, 0.5, {g * std::sin(angle), 0, -g * std::cos(angle)});
         world.add_plane(Vec3::Zero(), Vec3::UnitZ());
-        // A flat disc: rests on many nodes and does not roll.
-        const int b = add_grid(world, world.add_shape(grid_ellipsoid({6e-3, 6e-3, 1.5e-3}, 0.25e-3, 20000, 1e-3)), {0, 0, 1.5e-3});
-        world.set_friction(0, 0.0);
-        WorldOptions o;
-        world.advance(0.01, 4e-6);
-        world.set_velocity(b, Vec3::Zero(), Vec3::Zero());
-        world.set_friction(0, 0.5);
+        const int b = add_grid(world, world.add_shape(grid_block({3e-3, 3e-3, 1e-3}, 0.2e-3)), {0, 0, 1e-3});
         const double start = world.position(b).x();
-        world.advance(0.03, 4e-6);
+        world.advance(0.005, 1e-6);  // a flat face is much stiffer than a round contact
         const double moved = world.position(b).x() - start;
-        const double ideal = 0.5 * g * (std::sin(angle) - 0.5 * std::cos(angle)) * 0.03 * 0.03;
-        if (slides) EXPECT_NEAR(moved / ideal, 1.0, 0.1);
-        else EXPECT_LT(std::abs(moved), 2e-5);
-        EXPECT_NEAR(-world.wall_force(0).z() / (world.mass(b) * g * std::cos(angle)), 1.0, 0.1);
+        const double ideal = 0.5 * g * (std::sin(angle) - 0.5 * std::cos(angle)) * 0.005 * 0.005;
+        if (slides) EXPECT_NEAR(moved / ideal, 1.0, 0.01);
+        else EXPECT_LT(std::abs(moved), 1e-6);
     }
 }
 
@@ -218,7 +211,6 @@ TEST(SphereOnGrid, bouncing_in_a_closed_void_keeps_its_energy_and_stays)
     World world = quiet_world(0.0, 0.0);
     const int sphere = world.add_shape(Shape::sphere());
     add_grid(world, world.add_shape(shell), Vec3::Zero(), Vec3::Zero(), Vec3::Zero(), Quat::Identity(), Motion::fixed);
-    std::vector<int> balls;
     std::mt19937_64 random(6);
     const int b = add_sphere(world, sphere, 2e-3, {0.4e-3, -0.3e-3, 0.2e-3}, 0.1 * random_direction(random));
     const double before = world.energy().stored();
@@ -266,7 +258,7 @@ TEST(SphereOnGrid, linked_rings_hold_each_other)
     const auto torus = [&](int nodes) {
         GridShapeData d;
         d.name = "torus";
-        d.distance = tabulate([&](const Vec3& p) { return std::hypot(p.head<2>().norm() - big, p.z()) - small; }, Vec3(6.8e-3, 6.8e-3, 1.8e-3), 0.1e-3);
+        d.distance = tabulate([&](const Vec3& p) { return std::hypot(p.head<2>().norm() - big, p.z()) - small; }, Vec3(6.8e-3, 6.8e-3, 1.8e-3), 0.2e-3);
         const int around = int(std::sqrt(nodes * big / small)), across = nodes / around;
         for (int i = 0; i < around; ++i)
             for (int j = 0; j < across; ++j) {
@@ -286,7 +278,7 @@ TEST(SphereOnGrid, linked_rings_hold_each_other)
     const int b = add_grid(world, shape, {7.9e-3, 0, 0}, Vec3::Zero(), Vec3::Zero(), Quat(Eigen::AngleAxisd(std::numbers::pi / 2, Vec3::UnitX())));
     world.set_external_force(b, {1.0, 0, 0}, Vec3::Zero());
     world.advance(0.03, 4e-6);
-    EXPECT_NEAR(world.position(b).x(), 8.022e-3, 2.5e-6);
+    EXPECT_NEAR(world.position(b).x(), 8.022e-3, 0.12 * 22e-6) << "the notes give 8.021 to 8.023 for 2500 nodes and more";
     EXPECT_NEAR(world.contacts().at(0).normal_force.norm(), 1.0, 0.02);
 }
 

@@ -109,6 +109,36 @@ inline std::shared_ptr<const Shape> grid_ellipsoid(const Vec3& a, double spacing
     return Shape::grid(std::move(d));
 }
 
+/// Box with half edges a; nodes on a lattice of about `step` on its faces.
+inline std::shared_ptr<const Shape> grid_block(const Vec3& a, double step)
+{
+    GridShapeData d;
+    d.name = "block";
+    d.distance = tabulate(
+        [&](const Vec3& p) {
+            const Vec3 q = p.cwiseAbs() - a;
+            return q.cwiseMax(0.0).norm() + std::min(q.maxCoeff(), 0.0);
+        },
+        a.array() + 0.5e-3, step);
+    for (int axis = 0; axis < 3; ++axis) {
+        const int u = (axis + 1) % 3, v = (axis + 2) % 3, nu = int(std::round(2 * a[u] / step)), nv = int(std::round(2 * a[v] / step));
+        for (const double side : {-1.0, 1.0})
+            for (int i = 0; i < nu; ++i)
+                for (int j = 0; j < nv; ++j) {
+                    Vec3 p;
+                    p[axis] = side * a[axis];
+                    p[u] = a[u] * ((2 * i + 1.0) / nu - 1.0);
+                    p[v] = a[v] * ((2 * j + 1.0) / nv - 1.0);
+                    d.nodes.push_back(p);
+                    d.node_areas.push_back(4.0 * a[u] * a[v] / (nu * nv));
+                }
+    }
+    d.volume = 8.0 * a.prod();
+    const Vec3 s = a.cwiseProduct(a);
+    d.inertia = d.volume / 3.0 * Vec3(s.y() + s.z(), s.x() + s.z(), s.x() + s.y()).asDiagonal().toDenseMatrix();
+    return Shape::grid(std::move(d));
+}
+
 /// World without gravity, with the material of Table 2 and given damping and friction.
 inline World quiet_world(double damping, double friction, const Vec3& gravity = Vec3::Zero())
 {

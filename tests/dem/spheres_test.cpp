@@ -97,7 +97,7 @@ TEST(SphereContact, damping_ratio_gives_the_restitution_of_the_clamped_oscillato
 {
     EXPECT_NEAR(restitution_of_damping(0.3), 0.4510, 1e-4);
     EXPECT_NEAR(restitution_of_damping(damping_of_restitution(0.3)), 0.3, 1e-12);
-    for (const auto& [dt, tolerance] : {std::pair{2e-7, 5e-3}, std::pair{1e-6, 3e-2}}) {
+    for (const auto& [dt, tolerance] : {std::pair{2e-7, 5e-3}, std::pair{1e-6, 2e-2}}) {
         World world = quiet_world(0.3, 0.7);
         const int shape = world.add_shape(Shape::sphere());
         add_sphere(world, shape, 1.5e-3, {0, 0, 0}, {0.1, 0, 0});
@@ -105,7 +105,7 @@ TEST(SphereContact, damping_ratio_gives_the_restitution_of_the_clamped_oscillato
         world.advance(3e-3, dt);
         EXPECT_NEAR((world.velocity(1) - world.velocity(0)).x() / 0.2, 0.4510, 0.4510 * tolerance);
         const Energy e = world.energy();
-        EXPECT_NEAR(e.closure, 0.0, 0.02 * e.initial);
+        EXPECT_NEAR(e.closure, 0.0, 2e5 * dt * e.initial * 0.2) << "first order in the step";
     }
 }
 

@@ -87,7 +87,7 @@ struct NodeList {
     std::vector<Index> node;
     std::vector<Vec3> spring;
     std::vector<std::uint8_t> touch;
-    std::vector<Vec3> gradient;               ///< scratch of the loop, world frame
+    std::vector<Vec3> gradient, arm;          ///< scratch of the loop, world frame
     std::vector<double> force, depth;         ///< scratch of the loop
     std::vector<double> share;                ///< 1, or 1/2 for the two directions of a pair
     std::vector<GeneralForce> out;
