@@ -91,6 +91,19 @@ struct H5File::Impl {
         }
         return true;
     }
+    /// The group and those on the way, each without time stamps (HDF5's own intermediate groups would carry them).
+    void make_groups(const std::string& group)
+    {
+        for (std::size_t i = 1; i <= group.size(); ++i) {
+            if (i != group.size() && group[i] != '/') continue;
+            const std::string part = group.substr(0, i);
+            if (H5Lexists(file, part.c_str(), H5P_DEFAULT) > 0) continue;
+            const Id list(H5Pcreate(H5P_GROUP_CREATE), H5Pclose);
+            H5Pset_obj_track_times(list, 0);
+            const Id made(H5Gcreate2(file, part.c_str(), H5P_DEFAULT, list, H5P_DEFAULT), H5Gclose);
+            if (!made.valid()) fail(part, "could not be written");
+        }
+    }
     Id open_dataset(const std::string& object) const
     {
         if (!exists(object)) fail(object, "is missing");
@@ -112,10 +125,9 @@ struct H5File::Impl {
         if (expected != count) fail(object, "dimensions do not fit the data");
         const std::vector<hsize_t> sizes(shape.begin(), shape.end());
         const Id space(H5Screate_simple(static_cast<int>(sizes.size()), sizes.data(), nullptr), H5Sclose);
-        const Id links(H5Pcreate(H5P_LINK_CREATE), H5Pclose);
-        H5Pset_create_intermediate_group(links, 1);
+        if (const std::size_t slash = object.rfind('/'); slash != std::string::npos) make_groups(object.substr(0, slash));
         const Id list = creation_list(shape);
-        const Id dataset(H5Dcreate2(file, object.c_str(), type, space, links, list, H5P_DEFAULT), H5Dclose);
+        const Id dataset(H5Dcreate2(file, object.c_str(), type, space, H5P_DEFAULT, list, H5P_DEFAULT), H5Dclose);
         if (!dataset.valid() || (count > 0 && H5Dwrite(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, data) < 0)) fail(object, "could not be written");
     }
     template <class T>
@@ -204,11 +216,7 @@ std::vector<std::string> H5File::members(const std::string& group) const
 
 void H5File::make_group(const std::string& path)
 {
-    if (impl_->exists(path)) return;
-    const Id links(H5Pcreate(H5P_LINK_CREATE), H5Pclose);
-    H5Pset_create_intermediate_group(links, 1);
-    const Id group(H5Gcreate2(impl_->file, path.c_str(), links, H5P_DEFAULT, H5P_DEFAULT), H5Gclose);
-    if (!group.valid()) impl_->fail(path, "could not be written");
+    if (!impl_->exists(path)) impl_->make_groups(path);
 }
 
 void H5File::write(const std::string& path, std::span<const double> data, std::vector<std::size_t> dims) { impl_->write(path, data.data(), data.size(), H5T_NATIVE_DOUBLE, dims); }

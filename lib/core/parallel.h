@@ -15,18 +15,28 @@ namespace coral {
 void set_thread_count(int count);
 int thread_count();
 
+namespace detail {
+/// The one compiled copy of a loop body. Inlined into the serial and the parallel branch it could be optimised in two ways that
+/// round differently, and the result would depend on the number of threads.
+template <class Body>
+[[gnu::noipa]] void run_block(const Body& body, std::size_t begin, std::size_t end)
+{
+    body(begin, end);
+}
+}  // namespace detail
+
 /// body(begin, end) over blocks of at most `grain` elements. The blocks are the same for any thread count.
 template <class Body>
 void parallel_blocks(std::size_t count, std::size_t grain, const Body& body)
 {
     if (count == 0) return;
     if (thread_count() == 1 || count <= grain) {
-        for (std::size_t begin = 0; begin < count; begin += grain) body(begin, std::min(begin + grain, count));
+        for (std::size_t begin = 0; begin < count; begin += grain) detail::run_block(body, begin, std::min(begin + grain, count));
         return;
     }
     tbb::parallel_for(
         std::size_t{0}, (count + grain - 1) / grain,
-        [&](std::size_t b) { body(b * grain, std::min((b + 1) * grain, count)); }, tbb::static_partitioner{});
+        [&](std::size_t b) { detail::run_block(body, b * grain, std::min((b + 1) * grain, count)); }, tbb::static_partitioner{});
 }
 
 /// Sum of body(begin, end) over blocks, added in block order: the same bits for any thread count.
