@@ -62,7 +62,7 @@ Flow::Flow(const GridSpec& grid, const FlowOptions& options) : grid_(grid), layo
     pressure_ = layout_.make_field();
     work_ = poisson_->make_work();
     const std::size_t blocks = (std::size_t(grid.cells.z()) + 1 + planes_per_block - 1) / planes_per_block;
-    scratch_ = Field(blocks * std::size_t(layout_.stride[2] + 2 * layout_.stride[1]), 0.0);
+    scratch_ = Field(blocks * scratch_block(), 0.0);
     restart_history();
 }
 
@@ -107,7 +107,7 @@ void Flow::change_void_fraction(Field& void_fraction)
 {
     porous_fields_for_writing();
     fill_centre_ghosts(void_fraction);
-    porous_.void_fraction = void_fraction;
+    porous_.void_fraction.swap(void_fraction);
     const bool initial = !has_fines_ && previous_dt_ == 0.0;
     has_fines_ = true;
     find_fluid_mass();
@@ -126,8 +126,11 @@ void Flow::find_fluid_mass()
             for (int k = range.low.z() + int(begin); k < range.low.z() + int(end); ++k)
                 for (int j = range.low.y(); j < range.high.y(); ++j) {
                     const std::size_t f0 = layout_.index(range.low.x(), j, k);
-                    sum += detail::weighted_row(grid_, axis, range, j, k, add_lanes,
-                                                [&](std::ptrdiff_t i) { return face_void_fraction(axis, f0 + std::size_t(i)); });
+                    const double* high = has_fines_ ? porous_.void_fraction.data() + f0 : nullptr;
+                    const double* low = has_fines_ ? high - layout_.stride[axis] : nullptr;
+                    sum += has_fines_ ? detail::weighted_row(grid_, axis, range, j, k, add_lanes,
+                                                             [&](std::ptrdiff_t i) { return 0.5 * (low[i] + high[i]); })
+                                      : detail::weighted_row(grid_, axis, range, j, k, add_lanes, [](std::ptrdiff_t) { return 1.0; });
                 }
             return sum;
         });
@@ -146,9 +149,12 @@ Eigen::Vector3d Flow::total_momentum() const
             for (int k = range.low.z() + int(begin); k < range.low.z() + int(end); ++k)
                 for (int j = range.low.y(); j < range.high.y(); ++j) {
                     const std::size_t f0 = layout_.index(range.low.x(), j, k);
-                    sum += detail::weighted_row(grid_, axis, range, j, k, add_lanes, [&](std::ptrdiff_t i) {
-                        return face_void_fraction(axis, f0 + std::size_t(i)) * u[f0 + std::size_t(i)];
-                    });
+                    const double* row = u + f0;
+                    const double* high = has_fines_ ? porous_.void_fraction.data() + f0 : nullptr;
+                    const double* low = has_fines_ ? high - layout_.stride[axis] : nullptr;
+                    sum += has_fines_ ? detail::weighted_row(grid_, axis, range, j, k, add_lanes,
+                                                             [&](std::ptrdiff_t i) { return 0.5 * (low[i] + high[i]) * row[i]; })
+                                      : detail::weighted_row(grid_, axis, range, j, k, add_lanes, [&](std::ptrdiff_t i) { return row[i]; });
                 }
             return sum;
         });
@@ -264,6 +270,8 @@ void Flow::diagnose()
 {
     const std::ptrdiff_t s[3] = {1, layout_.stride[1], layout_.stride[2]};
     const double* u[3] = {velocity_[0].data(), velocity_[1].data(), velocity_[2].data()};
+    const double* eps = porous_.void_fraction.data();
+    const double* J[3] = {porous_.solid_flux[0].data(), porous_.solid_flux[1].data(), porous_.solid_flux[2].data()};
     std::vector<Eigen::Vector2d> largest((std::size_t(grid_.cells.z()) + planes_per_block - 1) / planes_per_block, {0.0, 0.0});
     parallel_blocks(std::size_t(grid_.cells.z()), planes_per_block, [&](std::size_t begin, std::size_t end) {
         Eigen::Vector2d& block = largest[begin / planes_per_block];
@@ -286,9 +294,8 @@ void Flow::diagnose()
                 const auto porous_divergence = [&](std::ptrdiff_t i) {
                     double sum = 0.0;
                     for (int d = 0; d < 3; ++d) {
-                        const auto c = std::size_t(c0 + i), next = c + std::size_t(s[d]);
-                        sum += face_void_fraction(d, next) * u[d][next] - face_void_fraction(d, c) * u[d][c] +
-                               porous_.solid_flux[d][next] - porous_.solid_flux[d][c];
+                        const std::ptrdiff_t c = c0 + i, next = c + s[d];
+                        sum += 0.5 * (eps[c] + eps[next]) * u[d][next] - 0.5 * (eps[c - s[d]] + eps[c]) * u[d][c] + J[d][next] - J[d][c];
                     }
                     return std::abs(sum);
                 };

@@ -146,7 +146,8 @@ public:
     const PorousFields& porous_fields() const { return porous_; }
     /// For FineCoupling: allocates the fields on first use.
     PorousFields& porous_fields_for_writing();
-    /// For FineCoupling: takes a new void fraction (centres; ghosts are filled here) and books the momentum that its change moves.
+    /// For FineCoupling: takes a new void fraction (centres; ghosts are filled here), gives the old one back in its place, and books the
+    /// momentum that the change moves.
     void change_void_fraction(Field& void_fraction);
     /// Void fraction on face (i, j, k) = linear index `at` of component `axis`; 1 without fines.
     double face_void_fraction(int axis, std::size_t at) const
@@ -180,6 +181,8 @@ public:
     void restore(const FlowState& state);
 
 private:
+    /// Two planes and five rows: see sweep_component.
+    std::size_t scratch_block() const { return std::size_t(2 * layout_.stride[2] + 5 * layout_.stride[1]); }
     template <bool porous, Convection convection>
     void sweep_component(int axis, double dt, double now, double before);
     template <Convection convection>

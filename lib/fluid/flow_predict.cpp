@@ -58,25 +58,32 @@ void Flow::sweep_component(int axis, double dt, double now, double before)
     const double* const eps = porous ? porous_.void_fraction.data() : nullptr;
     double* const out = provisional_[axis].data();
     double* const rate = rate_[axis].data();
-    const std::size_t block_size = std::size_t(sz + 2 * sy);
+    constexpr bool advective = porous && convection != Convection::none;
+    const std::size_t block_size = scratch_block();
     advective_sum_[axis] = parallel_sum(range.planes(), planes_per_block, 0.0, [&](std::size_t begin, std::size_t end) {
-        double* __restrict gz = scratch_.data() + begin / planes_per_block * block_size;
-        double* __restrict gy = gz + sz;
-        double* __restrict gx = gy + sy;
-        double advective = 0.0;
+        double* __restrict gz = scratch_.data() + begin / planes_per_block * block_size;  // momentum fluxes through low sides
+        double* __restrict qz = gz + sz;                                                  // volume fluxes, only with fines
+        double* __restrict gy = qz + sz;
+        double* __restrict qy = gy + sy;
+        double* __restrict gx = qy + sy;
+        double* __restrict qx = gx + sy;
+        double* __restrict transported = qx + sy;
+        double sum = 0.0;
         const int k_begin = range.low.z() + int(begin), k_end = range.low.z() + int(end);
-        for (int j = range.low.y(); j < range.high.y(); ++j) {
-            const auto f0 = std::ptrdiff_t(layout_.index(range.low.x(), j, k_begin));
-            double* __restrict g = gz + j * sy;
-            for (std::ptrdiff_t i = 0; i < n; ++i) g[i] = low_flux<porous, convection>(view, 2, f0 + i);
-        }
+        const auto start_row = [&](int direction, std::ptrdiff_t f0, std::ptrdiff_t count, double* __restrict g, double* __restrict q) {
+            for (std::ptrdiff_t i = 0; i < count; ++i) g[i] = low_flux<porous, convection>(view, direction, f0 + i);
+            if constexpr (advective)
+                for (std::ptrdiff_t i = 0; i < count; ++i) q[i] = low_volume_flux(view, direction, f0 + i);
+        };
+        for (int j = range.low.y(); j < range.high.y(); ++j)
+            start_row(2, std::ptrdiff_t(layout_.index(range.low.x(), j, k_begin)), n, gz + j * sy, qz + j * sy);
         for (int k = k_begin; k < k_end; ++k) {
-            const auto first = std::ptrdiff_t(layout_.index(range.low.x(), range.low.y(), k));
-            for (std::ptrdiff_t i = 0; i < n; ++i) gy[i] = low_flux<porous, convection>(view, 1, first + i);
+            start_row(1, std::ptrdiff_t(layout_.index(range.low.x(), range.low.y(), k)), n, gy, qy);
             for (int j = range.low.y(); j < range.high.y(); ++j) {
                 const auto f0 = std::ptrdiff_t(layout_.index(range.low.x(), j, k));
-                for (std::ptrdiff_t i = 0; i <= n; ++i) gx[i] = low_flux<porous, convection>(view, 0, f0 + i);
+                start_row(0, f0, n + 1, gx, qx);
                 double* __restrict g = gz + j * sy;
+                double* __restrict q = qz + j * sy;
 #pragma GCC ivdep
                 for (std::ptrdiff_t i = 0; i < n; ++i) {
                     const std::ptrdiff_t f = f0 + i;
@@ -85,33 +92,25 @@ void Flow::sweep_component(int axis, double dt, double now, double before)
                     double r = ((gx[i] - gx[i + 1]) + (gy[i] - high_y) + (g[i] - high_z)) * inverse_h;
                     gy[i] = high_y;
                     g[i] = high_z;
-                    double face_eps = 1.0;
-                    if constexpr (porous) {
-                        face_eps = 0.5 * (eps[f] + eps[f - own]);
-                        if constexpr (convection != Convection::none) {
-                            double divergence = 0.0;
-                            for (int d = 0; d < 3; ++d)
-                                divergence += low_volume_flux(view, d, f + view.stride[d]) - low_volume_flux(view, d, f);
-                            r += u[f] * divergence * inverse_h;
-                        }
+                    if constexpr (advective) {
+                        const double q_y = low_volume_flux(view, 1, f + sy), q_z = low_volume_flux(view, 2, f + sz);
+                        transported[i] = u[f] * ((qx[i + 1] - qx[i]) + (q_y - qy[i]) + (q_z - q[i]));
+                        qy[i] = q_y;
+                        q[i] = q_z;
+                        r += transported[i] * inverse_h;
                     }
                     const double ab = now * r - before * rate[f];
                     rate[f] = r;
-                    out[f] = u[f] + dt * ((porous ? ab / face_eps : ab) - (p[f] - p[f - own]) * inverse_h + acceleration);
+                    const double force = porous ? ab / (0.5 * (eps[f] + eps[f - own])) : ab;
+                    out[f] = u[f] + dt * (force - (p[f] - p[f - own]) * inverse_h + acceleration);
                 }
-                if constexpr (porous && convection != Convection::none) {
-                    const auto transported = [&](std::ptrdiff_t i) {
-                        double divergence = 0.0;
-                        for (int d = 0; d < 3; ++d)
-                            divergence += low_volume_flux(view, d, f0 + i + view.stride[d]) - low_volume_flux(view, d, f0 + i);
-                        return u[f0 + i] * divergence;
-                    };
-                    advective += detail::weighted_row(
-                        grid_, axis, range, j, k, [](std::ptrdiff_t m, const auto& v) { return detail::lane_sum(m, v); }, transported);
-                }
+                if constexpr (advective)
+                    sum += detail::weighted_row(
+                        grid_, axis, range, j, k, [](std::ptrdiff_t m, const auto& v) { return detail::lane_sum(m, v); },
+                        [&](std::ptrdiff_t i) { return transported[i]; });
             }
         }
-        return advective;
+        return sum;
     });
     advective_sum_[axis] *= options_.density * h * h;
 }

@@ -56,8 +56,6 @@ public:
     void drag_lag(const Flow& flow, std::span<const double> coefficients, std::span<Eigen::Vector3d> lag) const;
 
     std::size_t size() const { return count_; }
-    /// Void fraction as last deposited, padded like a field.
-    const Field& void_fraction() const { return void_fraction_; }
     /// Blocks of cells used for the felt averages, and stored weights (for the performance report).
     int coupling_cells() const { return block_; }
     std::size_t stored_weights() const;
@@ -96,8 +94,10 @@ private:
     void scatter(const std::vector<Weights>& chunks, const Target& target, Quads& quads, const Value& value) const;
     template <class Value>
     void gather(const std::vector<Weights>& chunks, const Value& value, std::span<Eigen::Vector4d> sums) const;
-    template <class CellValue>
-    void average_blocks(Quads& quads, const CellValue& value) const;
+    void deposit_flux(int axis, Field& flux) const;
+    void gather_pressure_gradient(const Flow& flow, std::span<FeltFlow> felt) const;
+    template <class Fill>
+    void average_blocks(Quads& quads, const Fill& fill) const;
     void cell_row(const Quads& block_values, int j, int k, double* row) const;
 
     GridSpec grid_;
@@ -108,7 +108,8 @@ private:
     Target cells_, blocks_;
     std::vector<Weights> volume_, felt_;
     Field open_cells_, open_blocks_;  // 1 - phi per cell (padded); its sum per block
-    Field void_fraction_, clip_;      // clip_: (1 - eps)/(raw solid fraction); empty when nothing is clipped
+    Field void_fraction_;             // of the next step; changes places with the flow's
+    Field clip_;                      // (1 - eps)/(raw solid fraction); empty when nothing is clipped
     Quads cell_quads_;
     mutable Quads block_quads_;
     mutable std::vector<Eigen::Vector4d> sums_;
