@@ -134,6 +134,14 @@ void check(const Options& o)
     if (o.split == "watershed" && o.labels == "labels") throw UsageError("--split watershed", "goes not with --labels labels", "given labels are kept as they are");
 }
 
+/// Length for people: four digits.
+std::string short_length(double length)
+{
+    if (length <= 0) return "0 m";
+    const double unit = std::pow(10.0, std::floor(std::log10(length)) - 3);
+    return format_quantity(std::round(length / unit) * unit, Dimension::length);
+}
+
 /// Labels of all grains; the stack is taken apart on the way.
 struct Labelled {
     std::vector<std::uint32_t> labels;
@@ -165,7 +173,7 @@ Labelled label(const Options& o, morph::VoxelStack&& stack, Stages& stages)
         out.labels = std::move(grains.labels);
         out.closing_radius = grains.closing_radius;
         spdlog::info("watershed: {} bodies; voids narrower than {} were closed first (--throat sets it)", grains.grains,
-                     format_quantity(2.0 * grains.closing_radius, Dimension::length));
+                     short_length(2.0 * grains.closing_radius));
     } else {
         out.labels = morph::connected_components(segmentation.solid.voxels, segmentation.solid.size, 1, morph::Connectivity::full).labels;
     }
@@ -187,9 +195,9 @@ double choose_spacing(const Options& o, const Labelled& stack, const std::vector
     for (const morph::Grain& grain : grains) scales.push_back(grain.scale);
     const double edge = stack.voxel_size.maxCoeff() * (scales.empty() ? 1.0 : median(scales));
     const double spacing = o.spacing > 0 ? o.spacing : o.scale_to > 0 ? std::max(o.scale_to / 75.0, edge) : 2.0 * edge;
-    if (o.spacing <= 0) spdlog::info("level-set spacing {} (--spacing sets it)", format_quantity(spacing, Dimension::length));
-    else if (spacing < edge) spdlog::warn("--spacing {} is finer than the voxels ({}): it adds nodes, no detail", format_quantity(spacing, Dimension::length),
-                                          format_quantity(edge, Dimension::length));
+    if (o.spacing <= 0) spdlog::info("level-set spacing {} (--spacing sets it)", short_length(spacing));
+    else if (spacing < edge) spdlog::warn("--spacing {} is finer than the voxels ({}): it adds nodes, no detail", short_length(spacing),
+                                          short_length(edge));
     return spacing;
 }
 
@@ -357,8 +365,8 @@ std::string human_summary(const Options& o, const nlohmann::ordered_json& json)
         "{:.1f} s, {:.0f} MB\n",
         o.output.string(), json["grains"].get<std::size_t>(), json["touching"].get<std::size_t>(), json["dropped"].get<std::size_t>(),
         json["dropped_border"].get<std::size_t>(), json["dropped_small"].get<std::size_t>(), json["dropped_thin"].get<std::size_t>(),
-        format_quantity(json["equivalent_diameter_median"].get<double>(), Dimension::length), json["intraparticle_porosity"].get<double>(),
-        format_quantity(json["spacing"].get<double>(), Dimension::length), 100.0 * std::abs(json["largest_volume_error"].get<double>()), seconds,
+        short_length(json["equivalent_diameter_median"].get<double>()), json["intraparticle_porosity"].get<double>(),
+        short_length(json["spacing"].get<double>()), 100.0 * std::abs(json["largest_volume_error"].get<double>()), seconds,
         json["peak_memory"].get<double>() / 1e6);
 }
 

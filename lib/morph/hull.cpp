@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <vector>
 
 #include "core/error.h"
@@ -26,23 +27,27 @@ HullProperties hull_properties(std::span<const Eigen::Vector3d> points)
     const auto refuse = [] { throw Error("convex hull", "the points lie in one plane"); };
     if (hull.number_of_faces() < 4) refuse();
 
-    HullProperties out;
-    const Point reference = *hull.points().begin();
+    // CGAL orders faces and vertices by memory address and may cut plane faces differently: vertices are sorted, and the sum,
+    // in rising order, is kept to twelve digits, so that the result depends on the points alone.
     std::vector<Point> corners;
+    for (const auto v : hull.vertices()) corners.push_back(hull.point(v));
+    std::sort(corners.begin(), corners.end());
+    double span = 0;
+    for (const Point& p : corners) span = std::max(span, std::sqrt(CGAL::squared_distance(corners.front(), p)));
+    std::vector<double> parts;
     for (const auto f : hull.faces()) {
         std::array<Point, 3> t;
         std::size_t n = 0;
         for (const auto v : hull.vertices_around_face(hull.halfedge(f)))
             if (n < 3) t[n++] = hull.point(v);
-        out.volume += CGAL::to_double(CGAL::volume(reference, t[0], t[1], t[2]));
+        parts.push_back(std::abs(CGAL::volume(corners.front(), t[0], t[1], t[2])));
     }
-    out.volume = std::abs(out.volume);
-    double span = 0;
-    for (const auto v : hull.vertices()) {
-        corners.push_back(hull.point(v));
-        span = std::max(span, std::sqrt(CGAL::squared_distance(reference, corners.back())));
-    }
+    std::sort(parts.begin(), parts.end());
+    HullProperties out;
+    for (const double part : parts) out.volume += part;
     if (out.volume <= 1e-9 * span * span * span) refuse();  // a flat set may come as a body of two sides
+    const double digit = std::pow(10.0, std::floor(std::log10(out.volume)) - 12.0);
+    out.volume = std::round(out.volume / digit) * digit;
 
     // The search for the box is random inside; a fixed seed makes it the same for every grain order and thread.
     CGAL::get_default_random() = CGAL::Random(0);
