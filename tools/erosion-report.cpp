@@ -35,8 +35,8 @@ ordered_json summary_json(const coral::report::CaseData& data)
             {"eroded_count", number(s.eroded_count)},
             {"fines_at_start", number(s.fines_at_start)},
             {"trapped_count", number(s.trapped_count)},
-            {"hydraulic_gradient", {number(s.gradient_first), number(s.gradient_last)}},
-            {"hydraulic_conductivity", {number(s.conductivity_first), number(s.conductivity_last)}},
+            {"hydraulic_gradient", {number(s.gradient_early), number(s.gradient_late)}},
+            {"hydraulic_conductivity", {number(s.conductivity_early), number(s.conductivity_late)}},
             {"mass_balance_error", number(s.mass_error)},
             {"momentum_balance_error", number(s.momentum_error)},
             {"warnings", s.warnings}};

@@ -67,6 +67,17 @@ const std::vector<TimeFigure>& time_figures()
     return all;
 }
 
+/// Whether a case has fines at all: without, curves of erosion are flat lines that say nothing.
+bool has_fines(const CaseData& data)
+{
+    const Series* fines = data.find("fines_count");
+    const Series* eroded = data.find("eroded_mass_fraction");
+    const auto any = [](const Series* series) { return series && std::ranges::any_of(series->values, [](double v) { return v > 0; }); };
+    return !fines || any(fines) || any(eroded);
+}
+
+bool about_fines(const std::string& figure) { return figure == "eroded_mass" || figure == "fines_per_layer" || figure == "trapped_fines"; }
+
 /// Series and component behind a column name, or null.
 struct Source {
     const Series* series = nullptr;
@@ -126,6 +137,7 @@ Figure make_time_figure(const TimeFigure& spec, const std::vector<CaseData>& cas
         figure.panels.push_back(made);
     }
     for (const CaseData& data : cases) {
+        if (about_fines(figure.name) && !has_fines(data)) continue;
         std::vector<Source> sources;
         for (std::size_t c = 2; c < figure.table.columns.size(); ++c) sources.push_back(find_column(data, figure.table.columns[c]));
         if (std::ranges::none_of(sources, [](const Source& s) { return s.series != nullptr; })) continue;
@@ -151,7 +163,7 @@ Figure make_layer_bars(const std::vector<CaseData>& cases)
     figure.panels = {{"", "fines [count]", 1, false, {{"count_start", "start"}, {"count_end", "end"}}}};
     for (const CaseData& data : cases) {
         const Series* fines = data.find("fines_count");
-        if (!fines || fines->width != 3) continue;
+        if (!fines || fines->width != 3 || !has_fines(data)) continue;
         for (std::size_t layer = 0; layer < 3; ++layer)
             figure.table.add({data.name, static_cast<double>(layer), number_cell(fines->at(0, layer)), number_cell(fines->at(fines->steps() - 1, layer))});
     }

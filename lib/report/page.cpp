@@ -88,17 +88,19 @@ std::string key_figures(const std::vector<CaseData>& cases)
     std::vector<std::vector<Setting>> columns;
     for (const CaseData& data : cases) {
         const Summary s = summarise(data);
-        const auto centimetres = [](double k, double t) { return std::isfinite(k) ? short_number(100 * k) + " cm/s at " + short_number(t) + " s" : std::string("-"); };
+        const auto centimetres = [](double k) { return std::isfinite(k) ? short_number(100 * k) + " cm/s" : std::string("-"); };
         columns.push_back({{"Time reached", short_number(s.end_time) + " s"},
                            {"Eroded mass", std::isfinite(s.eroded_mass_fraction) ? short_number(100 * s.eroded_mass_fraction) + " %" : "-"},
                            {"Eroded fines", short_number(s.eroded_count, 9) + " of " + short_number(s.fines_at_start, 9)},
                            {"Fines trapped inside grains", short_number(s.trapped_count, 9)},
-                           {"Hydraulic gradient, first and last", short_number(s.gradient_first) + ", " + short_number(s.gradient_last)},
-                           {"Hydraulic conductivity, first", centimetres(s.conductivity_first, s.conductivity_first_time)},
-                           {"Hydraulic conductivity, last", centimetres(s.conductivity_last, s.conductivity_last_time)},
-                           {"Hydraulic conductivity, least", std::isfinite(s.conductivity_least) ? short_number(100 * s.conductivity_least) + " cm/s" : "-"}});
+                           {"Hydraulic gradient, early", short_number(s.gradient_early)},
+                           {"Hydraulic gradient, late", short_number(s.gradient_late)},
+                           {"Hydraulic conductivity, early", centimetres(s.conductivity_early)},
+                           {"Hydraulic conductivity, late", centimetres(s.conductivity_late)},
+                           {"Hydraulic conductivity, least after 5 % of the run", centimetres(s.conductivity_least)}});
     }
-    return section("numbers", "Key figures") + compare_table(cases, columns) + "</section>\n";
+    return section("numbers", "Key figures") + compare_table(cases, columns) +
+           "<p class=\"soft\">Early is the median of the outputs between 5 and 15 % of the run, after the flow has started up; late that of the last 10 %.</p>\n</section>\n";
 }
 
 std::string setup_section(const std::vector<CaseData>& cases)
@@ -227,7 +229,7 @@ std::string viewer_controls(const std::vector<std::string>& names)
            "<label>Grains <input type=\"range\" id=\"view-fade\" min=\"5\" max=\"100\" value=\"100\"></label></div>\n<div id=\"viewer\"></div>\n"
            "<p class=\"soft\">Fines by the layer they started in:<span class=\"swatch\" style=\"background:#d55e00\"></span>top"
            "<span class=\"swatch\" style=\"background:#009e73\"></span>middle<span class=\"swatch\" style=\"background:#0072b2\"></span>bottom"
-           "<span class=\"swatch\" style=\"background:#8c6bb1\"></span>other bodies. Drag to turn, wheel to zoom, shift-drag to move; Cut opens the sample from the front.</p>\n"
+           "<span class=\"swatch\" style=\"background:#e3cfa4\"></span>other bodies. Drag to turn, wheel to zoom, shift-drag to move; Cut opens the sample from the front.</p>\n"
            "<p class=\"soft\" id=\"viewer-message\"></p>\n";
 }
 

@@ -145,7 +145,7 @@ ordered_json groups_of(const CaseData& data, const std::vector<std::size_t>& sph
     ordered_json groups = ordered_json::array();
     for (std::size_t column : spheres) {
         const auto it = layer_of.find(data.tracks.id[column]);
-        groups.push_back(it == layer_of.end() ? 3 : std::clamp<std::int64_t>(it->second, 0, 2));
+        groups.push_back(it == layer_of.end() || data.bodies[static_cast<std::size_t>(it->first)].role != "fine" ? 3 : std::clamp<std::int64_t>(it->second, 0, 2));
     }
     return groups;
 }

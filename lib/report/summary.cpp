@@ -26,22 +26,32 @@ double greatest_magnitude(const CaseData& data, const std::string& name)
     return greatest;
 }
 
-/// First, least and last of the finite positive values, with the times of the first and the last.
-void conductivity(const CaseData& data, Summary& summary)
+/// Median of the finite, positive values of a series between two times; the first one after `from` when there is none between.
+double median_between(const CaseData& data, const std::string& name, double from, double to)
 {
-    const Series* series = data.find("hydraulic_conductivity");
-    if (!series || series->width != 1) return;
+    const Series* series = data.find(name);
+    if (!series || series->width != 1) return unknown;
+    std::vector<double> values;
     for (std::size_t i = 0; i < series->steps(); ++i) {
-        const double k = series->at(i);
-        if (!std::isfinite(k) || k <= 0) continue;
-        if (std::isnan(summary.conductivity_first)) {
-            summary.conductivity_first = summary.conductivity_least = k;
-            summary.conductivity_first_time = data.time[i];
-        }
-        summary.conductivity_least = std::min(summary.conductivity_least, k);
-        summary.conductivity_last = k;
-        summary.conductivity_last_time = data.time[i];
+        const double v = series->at(i);
+        if (!std::isfinite(v) || v <= 0 || data.time[i] < from) continue;
+        if (data.time[i] > to && !values.empty()) break;
+        values.push_back(v);
+        if (data.time[i] > to) break;
     }
+    if (values.empty()) return unknown;
+    std::ranges::nth_element(values, values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2));
+    return values[values.size() / 2];
+}
+
+double least_after(const CaseData& data, const std::string& name, double from)
+{
+    const Series* series = data.find(name);
+    double least = unknown;
+    if (!series || series->width != 1) return least;
+    for (std::size_t i = 0; i < series->steps(); ++i)
+        if (const double v = series->at(i); data.time[i] >= from && std::isfinite(v) && v > 0 && !(v >= least)) least = v;
+    return least;
 }
 
 /// Fines of the layers plus those eroded, at one output.
@@ -90,13 +100,14 @@ Summary summarise(const CaseData& data)
     s.eroded_count = last_of(data, "eroded_count");
     s.fines_at_start = counted_fines(data, 0);
     s.trapped_count = last_of(data, "trapped_count");
-    s.gradient_first = unknown;
-    if (const Series* gradient = data.find("hydraulic_gradient"); gradient && gradient->width == 1)
-        if (const auto first = std::ranges::find_if(gradient->values, [](double v) { return std::isfinite(v) && v != 0; }); first != gradient->values.end())
-            s.gradient_first = *first;
-    s.gradient_last = last_of(data, "hydraulic_gradient");
-    s.conductivity_first = s.conductivity_least = s.conductivity_last = s.conductivity_first_time = s.conductivity_last_time = unknown;
-    conductivity(data, s);
+    const double start = data.time.front(), span = s.end_time - start;
+    const auto early = [&](const char* name) { return median_between(data, name, start + 0.05 * span, start + 0.15 * span); };
+    const auto late = [&](const char* name) { return median_between(data, name, start + 0.9 * span, s.end_time); };
+    s.gradient_early = early("hydraulic_gradient");
+    s.gradient_late = late("hydraulic_gradient");
+    s.conductivity_early = early("hydraulic_conductivity");
+    s.conductivity_late = late("hydraulic_conductivity");
+    s.conductivity_least = least_after(data, "hydraulic_conductivity", start + 0.05 * span);
     s.mass_error = greatest_magnitude(data, "mass_balance_error");
     s.momentum_error = greatest_magnitude(data, "momentum_balance_error");
     warn(data, s);
@@ -106,17 +117,19 @@ Summary summarise(const CaseData& data)
 std::string verdict(const Summary& s)
 {
     std::string text;
-    if (std::isfinite(s.eroded_mass_fraction)) {
+    if (s.fines_at_start == 0) {
+        text = "Ran to " + short_number(s.end_time) + " s without fines";
+    } else if (std::isfinite(s.eroded_mass_fraction)) {
         text = short_number(100 * s.eroded_mass_fraction, 3) + " % of the fines' mass eroded in " + short_number(s.end_time) + " s";
         if (std::isfinite(s.eroded_count))
             text += " (" + short_number(s.eroded_count, 9) + (std::isfinite(s.fines_at_start) ? " of " + short_number(s.fines_at_start, 9) : "") + " fines)";
+        if (std::isfinite(s.trapped_count)) text += "; " + short_number(s.trapped_count, 9) + " trapped inside grains";
     } else {
         text = "Ran to " + short_number(s.end_time) + " s; no erosion was measured";
     }
-    if (std::isfinite(s.trapped_count)) text += "; " + short_number(s.trapped_count, 9) + " trapped inside grains";
-    if (std::isfinite(s.conductivity_first))
-        text += "; hydraulic conductivity from " + short_number(100 * s.conductivity_first, 3) + " to " + short_number(100 * s.conductivity_last, 3) +
-                " cm/s (× " + short_number(s.conductivity_last / s.conductivity_first, 3) + ")";
+    if (std::isfinite(s.conductivity_early) && std::isfinite(s.conductivity_late))
+        text += "; hydraulic conductivity from " + short_number(100 * s.conductivity_early, 3) + " to " + short_number(100 * s.conductivity_late, 3) +
+                " cm/s (× " + short_number(s.conductivity_late / s.conductivity_early, 3) + ")";
     return text + ".";
 }
 

@@ -15,16 +15,16 @@ struct Summary {
     double eroded_count;          ///< at the end
     double fines_at_start;        ///< in the three layers at the first output, plus those eroded by then
     double trapped_count;         ///< at the end
-    double gradient_first, gradient_last;
-    double conductivity_first, conductivity_least, conductivity_last;  ///< [m/s]; the first and last finite positive values
-    double conductivity_first_time, conductivity_last_time;            ///< [s]
+    /// Early: median of the outputs in 5 to 15 % of the run, after the flow has started up; late: in the last 10 %. [-], [m/s]
+    double gradient_early, gradient_late, conductivity_early, conductivity_late;
+    double conductivity_least;    ///< after the first 5 % of the run [m/s]
     double mass_error, momentum_error;                                 ///< greatest magnitude over the run, unit of the series
     std::vector<std::string> warnings;  ///< what makes the run less than it seems, one sentence each
 };
 
 Summary summarise(const CaseData& data);
 
-/// "23.4 % of the fines' mass eroded in 2 s (912 of 3900 fines); 35 trapped inside grains; conductivity 1.7 to 4.4 cm/s (x 2.6)."
+/// "23.4 % of the fines' mass eroded in 2 s (912 of 3900 fines); 35 trapped inside grains; hydraulic conductivity from 1.7 to 4.4 cm/s (× 2.6)."
 std::string verdict(const Summary& summary);
 
 /// Number with so many significant digits, no trailing zeros; "-" for NaN.

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/error.h"
@@ -102,21 +103,36 @@ TEST(ReadCases, tells_folders_of_one_name_apart)
     EXPECT_EQ(cases[2].name, "fast/case (2)");
 }
 
-TEST(Summary, counts_fines_and_takes_the_first_finite_conductivity)
+TEST(Summary, counts_fines_and_takes_medians_early_and_late)
 {
     const ScratchFolder scratch;
     const ExampleCase example;
     write_example_case(scratch.path() / "ls", example);
-    const Summary s = summarise(read_case(scratch.path() / "ls"));
+    CaseData data = read_case(scratch.path() / "ls");
+    data.series["hydraulic_conductivity"].values[1] = -0.3;  // the flow starts up
+    data.series["hydraulic_conductivity"].values[4] = 5;     // a spike in the early window
+    const Summary s = summarise(data);
     EXPECT_EQ(s.fines_at_start, 120);
     EXPECT_EQ(s.eroded_count, std::round(120 * test::example_erosion(example, 2.0)));
-    EXPECT_DOUBLE_EQ(s.conductivity_first_time, 0.05);  // at t = 0 the example has no conductivity
-    EXPECT_DOUBLE_EQ(s.conductivity_first, 0.017 + 0.027 * (1 - std::exp(-0.05 / 0.6)));
-    EXPECT_DOUBLE_EQ(s.conductivity_last, 0.017 + 0.027 * (1 - std::exp(-2.0 / 0.6)));
+    // Outputs every 0.05 s: the early window holds 0.1 ... 0.3 s with 0.2 s spiked, so the median is the value at 0.25 s.
+    EXPECT_DOUBLE_EQ(s.conductivity_early, 0.017 + 0.027 * (1 - std::exp(-0.25 / 0.6)));
+    EXPECT_DOUBLE_EQ(s.conductivity_late, 0.017 + 0.027 * (1 - std::exp(-1.9 / 0.6)));
+    EXPECT_DOUBLE_EQ(s.conductivity_least, 0.017 + 0.027 * (1 - std::exp(-0.1 / 0.6)));
     EXPECT_LE(s.mass_error, 1e-13);
     EXPECT_TRUE(s.warnings.empty()) << s.warnings[0];
     EXPECT_EQ(verdict(s), "29.5 % of the fines' mass eroded in 2 s (35 of 120 fines); 10 trapped inside grains; "
-                          "hydraulic conductivity from 1.92 to 4.3 cm/s (× 2.25).");
+                          "hydraulic conductivity from 2.62 to 4.29 cm/s (× 1.64).");
+}
+
+TEST(Summary, of_a_run_without_fines_claims_no_erosion)
+{
+    const ScratchFolder scratch;
+    write_example_case(scratch.path() / "dry", {.fines = 0, .optional_series = true});
+    CaseData data = read_case(scratch.path() / "dry");
+    std::ranges::fill(data.series["eroded_mass_fraction"].values, 0.0);
+    std::ranges::fill(data.series["fines_count"].values, 0.0);
+    std::ranges::fill(data.series["eroded_count"].values, 0.0);
+    EXPECT_TRUE(verdict(summarise(data)).starts_with("Ran to 2 s without fines")) << verdict(summarise(data));
 }
 
 TEST(Summary, warns_of_a_run_that_stopped_early_or_lost_mass)

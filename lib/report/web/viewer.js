@@ -25,7 +25,7 @@
     var target = new THREE.Vector3(), distance = 1, azimuth = -0.9, elevation = 0.35;
     var clip = new THREE.Plane(new THREE.Vector3(0, 1, 0), 0);
     var world = null, current = null, pending = false;
-    var layers = [0x0072B2, 0x009E73, 0xD55E00, 0x8C6BB1];
+    var layers = [0x0072B2, 0x009E73, 0xD55E00];
 
     function draw() {
         if (pending) return;
@@ -101,9 +101,10 @@
             var members = [];
             scene.sphere_group.forEach(function (of, s) { if (of === group) members.push(s); });
             if (members.length === 0) continue;
-            var material = new THREE.MeshLambertMaterial({ color: layers[group], clippingPlanes: [clip] });
+            // Group 3 are grains that are spheres: they look and fade like the meshed ones.
+            var material = group === 3 ? made.sand : new THREE.MeshLambertMaterial({ color: layers[group], clippingPlanes: [clip] });
             // A geometry of its own: r111 keeps the matrices of the last group bound where two groups share one.
-            var instances = new THREE.InstancedMesh(new THREE.SphereBufferGeometry(1, 14, 10), material, members.length);
+            var instances = new THREE.InstancedMesh(new THREE.SphereBufferGeometry(1, group === 3 ? 32 : 14, group === 3 ? 24 : 10), material, members.length);
             instances.frustumCulled = false;
             made.root.add(instances);
             made.groups.push({ members: members, mesh: instances });
@@ -126,10 +127,10 @@
         scene.plates.forEach(function (plate) {
             rectangle(low[0], low[1], x1, y1, plate[0]);
             if (!(plate[1] > 0) || !(plate[2] > 0)) return;
-            var nx = Math.floor(size[0] / plate[2]), ny = Math.floor(size[1] / plate[2]);
+            var nx = Math.floor(size[0] / plate[2] + 1e-6), ny = Math.floor(size[1] / plate[2] + 1e-6);
             for (var i = 0; i < nx; ++i)
                 for (var j = 0; j < ny; ++j) {
-                    var cx = low[0] + size[0] / 2 + (i - (nx - 1) / 2) * plate[2], cy = low[1] + size[1] / 2 + (j - (ny - 1) / 2) * plate[2], r = plate[1] / 2;
+                    var cx = low[0] + (i + 0.5) * plate[2], cy = low[1] + (j + 0.5) * plate[2], r = plate[1] / 2;
                     rectangle(cx - r, cy - r, cx + r, cy + r, plate[0]);
                 }
         });
