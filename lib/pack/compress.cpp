@@ -13,21 +13,9 @@ namespace coral::pack::detail {
 namespace {
 
 constexpr int steps_between_checks = 50;  ///< walls keep their velocity in between
+constexpr int checks_per_window = 10;     ///< of the means that the stop rules look at
 constexpr double lid_first = 0.05;        ///< side walls wait until the lid carries this share of the pressure
 constexpr double deepest_overlap = 0.25;  ///< of the smaller radius; beyond it grains have lost their shape
-
-/// What the stop rules look at.
-struct State {
-    double unbalanced = 0, kinetic_ratio = 0, overlap = 0;
-};
-
-State state_of(const dem::World& world)
-{
-    const dem::Statistics s = world.statistics();
-    const dem::Energy e = world.energy();
-    const double elastic = e.elastic_normal + e.elastic_tangential;
-    return {s.unbalanced_ratio, elastic > 0 ? e.kinetic / elastic : 0, s.max_overlap};
-}
 
 void step_some(dem::World& world, double dt, double drag)
 {
@@ -37,10 +25,11 @@ void step_some(dem::World& world, double dt, double drag)
     }
 }
 
-void check_sound(const dem::World& world, const Box& box, const State& state)
+void check_sound(const dem::World& world, const Box& box)
 {
-    if (state.overlap > deepest_overlap)
-        throw Error("compression", "grains are pressed into each other by " + std::to_string(int(100 * state.overlap)) + " % of their radius",
+    const double overlap = world.statistics().max_overlap;
+    if (overlap > deepest_overlap)
+        throw Error("compression", "grains are pressed into each other by " + std::to_string(int(100 * overlap)) + " % of their radius",
                     "lower the pressure, raise the void ratio, or raise normal_stiffness");
     const Eigen::Vector3d lower = box.lower(world), upper = box.upper(world);
     for (int i = 0; i < world.body_count(); ++i)
@@ -107,6 +96,35 @@ void set_frictions(dem::World& world, const Spec& spec, double friction)
         world.set_friction(int(m), friction >= 0 ? friction : spec.materials[m].friction);
 }
 
+std::string describe(double pressure, const MotionWindow::Means& means)
+{
+    return "mean pressure " + format_quantity(std::round(pressure), Dimension::pressure) + ", unbalanced ratio " +
+           to_text(std::round(1e4 * means.unbalanced_ratio) / 1e4);
+}
+
+/// Sets the speeds of all pairs for the next few steps. Returns the worst relative error of a pressure; `mean` is their mean.
+double serve(dem::World& world, const Box& box, const Spec& spec, const std::array<int, 6>& contacts, double stiffness, double mass,
+             bool& lid_touches, double& mean)
+{
+    const Compression& rule = spec.compression;
+    const Eigen::Vector3d size = box.upper(world) - box.lower(world);
+    const int first_axis = rule.lateral ? 0 : 2;
+    double worst = 0;
+    mean = 0;
+    lid_touches = lid_touches || box.pressure(world, 5) > lid_first * rule.pressure;
+    for (int axis = first_axis; axis < 3; ++axis) {
+        // the top alone pushes against a bottom that also carries the weight
+        const double p = rule.lateral ? axis_pressure(world, box, axis) : box.pressure(world, 5);
+        const double missing = rule.pressure - p;
+        worst = std::max(worst, std::abs(missing) / rule.pressure);
+        mean += p / (3 - first_axis);
+        const int touching = std::min(contacts[std::size_t(2 * axis)], contacts[std::size_t(2 * axis + 1)]);
+        const double speed = servo_speed(missing, size.prod() / size[axis], size[axis], touching, stiffness, mass, rule.max_velocity);
+        set_pair_speed(world, box, axis, axis < 2 && !lid_touches ? 0.0 : speed, rule.lateral);
+    }
+    return worst;
+}
+
 bool to_pressure(dem::World& world, const Box& box, const Spec& spec)
 {
     const Compression& rule = spec.compression;
@@ -114,32 +132,25 @@ bool to_pressure(dem::World& world, const Box& box, const Spec& spec)
     set_frictions(world, spec, rule.friction);
     bool own_friction = rule.friction < 0, lid_touches = false;
     Progress progress("compressing", 1);
+    MotionWindow window(world);
     while (world.time() - start < rule.time_limit) {
-        const Eigen::Vector3d size = box.upper(world) - box.lower(world);
-        const auto contacts = wall_contacts(world, box);
         double worst = 0, mean = 0;
-        const int first_axis = rule.lateral ? 0 : 2;
-        for (int axis = first_axis; axis < 3; ++axis) {
-            // the top alone pushes against a bottom that also carries the weight
-            const double p = rule.lateral ? axis_pressure(world, box, axis) : box.pressure(world, 5);
-            const double missing = rule.pressure - p;
-            worst = std::max(worst, std::abs(missing) / rule.pressure);
-            mean += p / (3 - first_axis);
-            const int touching = std::min(contacts[std::size_t(2 * axis)], contacts[std::size_t(2 * axis + 1)]);
-            lid_touches = lid_touches || box.pressure(world, 5) > lid_first * rule.pressure;
-            set_pair_speed(world, box, axis, axis < 2 && !lid_touches ? 0.0 :
-                           servo_speed(missing, size.prod() / size[axis], size[axis], touching, kn, mass, rule.max_velocity), rule.lateral);
+        const auto contacts = wall_contacts(world, box);
+        window.start(world);
+        for (int check = 0; check < checks_per_window; ++check) {
+            double now = 0;
+            worst = std::max(worst, serve(world, box, spec, contacts, kn, mass, lid_touches, now));
+            mean += now / checks_per_window;
+            step_some(world, dt, rule.drag);
         }
-        step_some(world, dt, rule.drag);
-        const State s = state_of(world);
-        check_sound(world, box, s);
-        progress.update(std::min(mean / rule.pressure, 0.99), "mean pressure " + format_quantity(std::round(mean), Dimension::pressure) +
-                                                                  ", unbalanced ratio " + to_text(std::round(1e4 * s.unbalanced) / 1e4));
+        check_sound(world, box);
+        const MotionWindow::Means means = window.means(world);
+        progress.update(std::min(mean / rule.pressure, 0.99), describe(mean, means));
         if (!own_friction && worst < 0.1) {
             set_frictions(world, spec, -1);
             own_friction = true;
         }
-        if (own_friction && worst < rule.tolerance && s.unbalanced < rule.unbalanced_ratio && s.kinetic_ratio < 10 * rule.kinetic_ratio) {
+        if (own_friction && worst < rule.tolerance && means.unbalanced_ratio < rule.unbalanced_ratio && means.kinetic_ratio < 10 * rule.kinetic_ratio) {
             progress.finish();
             return true;
         }
@@ -169,9 +180,8 @@ bool to_void_ratio(dem::World& world, const Box& box, const Spec& spec, double a
         const double rate = std::min(2 * rule.max_velocity / (rule.lateral ? size.maxCoeff() : size.z()), excess / (edges * 500 * dt));
         for (int axis = rule.lateral ? 0 : 2; axis < 3; ++axis) set_pair_speed(world, box, axis, 0.5 * rate * size[axis], rule.lateral);
         step_some(world, dt, rule.drag);
-        const State s = state_of(world);
-        check_sound(world, box, s);
-        progress.update(first > target ? std::min((first - volume) / (first - target), 0.99) : 0.99, "unbalanced ratio " + to_text(std::round(1e4 * s.unbalanced) / 1e4));
+        check_sound(world, box);
+        progress.update(first > target ? std::min((first - volume) / (first - target), 0.99) : 0.99);
     }
     return false;
 }
@@ -212,24 +222,30 @@ void compress(dem::World& world, const Box& box, const Spec& spec, double appare
     report.compression_seconds = seconds_since(clock);
 }
 
-void relax(dem::World& world, const Spec& spec, PackReport& report)
+MotionWindow::Means relax(dem::World& world, const Spec& spec, PackReport& report)
 {
     const auto clock = std::chrono::steady_clock::now();
     const Compression& rule = spec.compression;
     const double dt = step_of(world, spec), start = world.time();
     set_frictions(world, spec, -1);
     Progress progress("relaxing", rule.relaxation_limit);
+    MotionWindow window(world);
+    MotionWindow::Means means;
     report.relaxed = false;
     while (!report.relaxed && world.time() - start < rule.relaxation_limit) {
-        step_some(world, dt, rule.drag);
-        const State s = state_of(world);
-        report.relaxed = s.unbalanced < rule.unbalanced_ratio && s.kinetic_ratio < rule.kinetic_ratio;
+        window.start(world);
+        for (int check = 0; check < checks_per_window; ++check) step_some(world, dt, rule.drag);
+        means = window.means(world);
+        report.relaxed = means.unbalanced_ratio < rule.unbalanced_ratio && means.kinetic_ratio < rule.kinetic_ratio;
         progress.update(std::min(world.time() - start, 0.99 * rule.relaxation_limit),
-                        "unbalanced ratio " + to_text(std::round(1e5 * s.unbalanced) / 1e5) + ", kinetic/elastic " + to_text(s.kinetic_ratio));
+                        "unbalanced ratio " + to_text(std::round(1e5 * means.unbalanced_ratio) / 1e5));
     }
     progress.finish();
-    if (!report.relaxed) report.warnings.push_back("the final relaxation ended at its time limit of " + to_text(rule.relaxation_limit) + " s; raise [compression] relaxation_limit");
+    if (!report.relaxed)
+        report.warnings.push_back("the final relaxation ended at its time limit of " + to_text(rule.relaxation_limit) +
+                                  " s; raise [compression] relaxation_limit");
     report.relaxation_seconds = seconds_since(clock);
+    return means;
 }
 
 }  // namespace coral::pack::detail

@@ -73,7 +73,7 @@ void measure_contacts(const Sample& sample, Statistics& s)
 
 }  // namespace
 
-void measure(const dem::World& world, const Box& box, double dem_step, std::int64_t steps, Sample& sample)
+void measure(const dem::World& world, const Box& box, const MotionWindow::Means& rest, double dem_step, std::int64_t steps, Sample& sample)
 {
     const Eigen::Vector3d lower = box.lower(world);
     sample.size = box.upper(world) - lower;
@@ -96,11 +96,9 @@ void measure(const dem::World& world, const Box& box, double dem_step, std::int6
     s = {};
     measure_volumes(sample, s);
     measure_contacts(sample, s);
-    const dem::Energy energy = world.energy();
-    const double elastic = energy.elastic_normal + energy.elastic_tangential;
-    s.kinetic_energy = energy.kinetic;
-    s.kinetic_ratio = elastic > 0 ? energy.kinetic / elastic : 0;
-    s.unbalanced_ratio = world.statistics().unbalanced_ratio;
+    s.kinetic_energy = world.statistics().kinetic_energy;
+    s.kinetic_ratio = rest.kinetic_ratio;
+    s.unbalanced_ratio = rest.unbalanced_ratio;
     for (const Wall& w : sample.walls) s.mean_pressure += w.pressure / double(sample.walls.size());
     s.dem_step = dem_step;
     s.dem_steps = double(steps);

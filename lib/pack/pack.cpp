@@ -39,13 +39,13 @@ Sample pack(const Spec& spec, std::uint64_t seed, PackReport& report)
     double apparent = 0;
     for (const Particle& p : sample.particles) apparent += apparent_volume(sample, p);
     detail::compress(world, box, spec, apparent, report);
-    detail::relax(world, spec, report);
+    const detail::MotionWindow::Means rest = detail::relax(world, spec, report);
     report.steps += world.counters().steps;
     report.simulated_time += world.time();
     if (report.unsettled_layers > 0)
         report.warnings.push_back(std::to_string(report.unsettled_layers) + " of " + std::to_string(report.layers) +
                                   " batches hit [dropping] time_limit before they had settled");
-    detail::measure(world, box, spec.dem_step > 0 ? spec.dem_step : world.auto_time_step(), report.steps, sample);
+    detail::measure(world, box, rest, spec.dem_step > 0 ? spec.dem_step : world.auto_time_step(), report.steps, sample);
     return std::move(sample);
 }
 

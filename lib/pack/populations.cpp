@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 #include <memory>
+#include <mutex>
 #include <numbers>
 #include <random>
 
@@ -256,14 +257,22 @@ Grains make_grains(const Spec& spec, std::uint64_t seed)
     }
     sample.shapes.resize(wanted.size());
     Progress progress("loading shapes", double(wanted.size()));
+    std::mutex progress_lock;
     std::size_t done = 0;
-    for (std::size_t k = 0; k < wanted.size(); ++k) {
+    const auto load = [&](std::size_t k) {
         const Population& p = spec.populations[wanted[k].population];
         // lists see spheres a skin (half a radius is ample) before they touch
         const double reach = 1.5 * largest_sphere / wanted[k].smallest_scale;
         sample.shapes[k] = p.shape == ShapeKind::sphere ? unit_sphere() : load_shape(p, wanted[k].id, reach);
+        const std::lock_guard lock(progress_lock);
         progress.update(double(++done));
-    }
+    };
+    const auto is_sh = [&](std::size_t k) { return spec.populations[wanted[k].population].shape == ShapeKind::sh; };
+    parallel_blocks(wanted.size(), 1, [&](std::size_t k, std::size_t) {
+        if (!is_sh(k)) load(k);
+    });
+    for (std::size_t k = 0; k < wanted.size(); ++k)
+        if (is_sh(k)) load(k);  // from HDF5, which is not thread-safe
     progress.finish();
     check_room(spec, grains);
     return grains;

@@ -128,26 +128,21 @@ double highest_point(const dem::World& world)
     return top;
 }
 
-double mean_speed(const dem::World& world)
-{
-    double sum = 0;
-    for (const auto& v : world.velocities()) sum += v.norm();
-    return world.body_count() > 0 ? sum / world.body_count() : 0;
-}
-
 /// Steps until the stop rule holds or the time is up. Returns whether it held.
 bool settle(dem::World& world, const Dropping& rule, double speed_limit, const std::function<void(double, double)>& tell)
 {
     constexpr int batch_of_steps = 100, decay_every = 10;
     const double dt = world.auto_time_step(), start = world.time();
+    MotionWindow window(world);
     while (world.time() - start < rule.time_limit) {
+        window.start(world);
         for (int i = 0; i < batch_of_steps; ++i) {
             world.step(dt);
             if (i % decay_every == 0) decay_velocities(world, rule.drag, decay_every * dt);
         }
-        const dem::Statistics s = world.statistics();
-        tell(world.time() - start, s.unbalanced_ratio);
-        if (s.contacts > 0 && s.unbalanced_ratio < rule.unbalanced_ratio && mean_speed(world) < speed_limit) return true;
+        const MotionWindow::Means means = window.means(world);
+        tell(world.time() - start, means.unbalanced_ratio);
+        if (means.contacts > 0 && means.unbalanced_ratio < rule.unbalanced_ratio && means.speed < speed_limit) return true;
     }
     return false;
 }

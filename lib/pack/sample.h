@@ -100,9 +100,9 @@ struct Statistics {
     double coordination_fine_coarse = 0;    ///< coarse neighbours of a fine grain, mean
     double coordination_fine_fine = 0;      ///< fine neighbours of a fine grain, mean
     double rattler_fraction = 0;        ///< grains with fewer than two contacts (walls counted) / grains [-]
-    double kinetic_ratio = 0;           ///< kinetic energy / elastic energy of the contacts [-]
-    double kinetic_energy = 0;          ///< [J]
-    double unbalanced_ratio = 0;        ///< mean |net force| on a touching grain / mean contact force [-]
+    double kinetic_ratio = 0;           ///< kinetic energy of the mean motion over the last 500 steps / elastic energy of the contacts [-]
+    double kinetic_energy = 0;          ///< of the last step [J]
+    double unbalanced_ratio = 0;        ///< mean |net force| on a touching grain, mean over 500 steps / mean normal contact force [-]
     double mean_pressure = 0;           ///< over the walls [Pa]
     double max_overlap = 0;             ///< greatest depth / equivalent diameter of the smaller grain [-]
     double max_wall_overlap = 0;

@@ -1,6 +1,8 @@
 #pragma once
 /// \file pack/detail/phases.h
 /// The phases of a packing (pack/pack.h), one function each.
+#include <vector>
+
 #include "dem/world.h"
 #include "pack/pack.h"
 #include "pack/populations.h"
@@ -9,6 +11,28 @@ namespace coral::pack::detail {
 
 /// Scales all velocities by exp(-rate time): the drag that shortens settling. A split step of its own, every few steps.
 void decay_velocities(dem::World& world, double rate, double time);
+
+/// Mean motion over many steps. A fine held in a groove of a grain is pushed by one wall of the groove in one step and by the other in
+/// the next (one query at its centre finds the nearest wall only), so the force of a single step says nothing about balance; its mean does.
+class MotionWindow {
+public:
+    explicit MotionWindow(const dem::World& world) { start(world); }
+    /// Begins a new window now.
+    void start(const dem::World& world);
+
+    struct Means {
+        double unbalanced_ratio = 0;  ///< mean |m dv/T| of touching grains / mean normal contact force [-]; 0 without contacts
+        double kinetic_ratio = 0;     ///< sum m |dx/T|^2 / 2 over the elastic energy [-]; 0 without contacts
+        double speed = 0;             ///< mean |dx/T| [m/s]
+        int contacts = 0;             ///< touching pairs, walls included
+    };
+    /// From the start of the window to now, T later. \pre at least one step was taken
+    Means means(const dem::World& world) const;
+
+private:
+    std::vector<Eigen::Vector3d> x_, v_;
+    double time_ = 0;
+};
 
 /// Box of the sample as planes of a world: walls `first` .. `first + 5` in the order x-, x+, y-, y+, z-, z+.
 struct Box {
@@ -25,10 +49,10 @@ void pour(Grains& grains, const Spec& spec, std::uint64_t seed, PackReport& repo
 /// Compresses to the target in a world built from the sample (bodies in its order).
 void compress(dem::World& world, const Box& box, const Spec& spec, double apparent_volume, PackReport& report);
 
-/// Comes to rest with walls that stand still.
-void relax(dem::World& world, const Spec& spec, PackReport& report);
+/// Comes to rest with walls that stand still. Returns the means of the last window.
+MotionWindow::Means relax(dem::World& world, const Spec& spec, PackReport& report);
 
 /// Poses, walls, contacts, springs, gradation, criteria and statistics of the final state; the lower corner moves to the origin.
-void measure(const dem::World& world, const Box& box, double dem_step, std::int64_t steps, Sample& sample);
+void measure(const dem::World& world, const Box& box, const MotionWindow::Means& rest, double dem_step, std::int64_t steps, Sample& sample);
 
 }  // namespace coral::pack::detail
