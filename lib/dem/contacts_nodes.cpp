@@ -78,7 +78,7 @@ void World::Impl::node_loop(double dt)
                 reach_b = equivalent[a];
             }
             const PairLaw& pair = law(material[a], material_b);
-            const double reduced = 1.0 / (inverse_mass[a] + master_inverse_mass);
+            const double root_mass = std::sqrt(1.0 / (inverse_mass[a] + master_inverse_mass));
             const double share = l.share[p];
             const double stiffness = share * pair.kn * inverse_radius / (2.0 * EIGEN_PI) * scale[a] * scale[a];
             const double inverse_length = sigmoid / (2.0 * std::min(equivalent[a], reach_b));
@@ -116,7 +116,7 @@ void World::Impl::node_loop(double dt)
                 double fn = l.force[k] * slope;
                 if (pair.damping > 0.0 && weight > 0.0) {
                     LoopSums node_sums;
-                    fn = weight * share * normal_force(fn / (weight * share), -relative.dot(n), pair.kn, pair.damping, reduced, dt, node_sums);
+                    fn = weight * share * normal_force(fn / (weight * share), -relative.dot(n), pair, root_mass, dt, node_sums);
                     s.damping += weight * share * node_sums.damping;
                 }
                 l.force[k] = fn;
@@ -131,7 +131,7 @@ void World::Impl::node_loop(double dt)
                 const Vec3 slide = relative - n.dot(relative) * n;
                 const double weight = normal_total > 0.0 ? l.force[k] / normal_total : 0.0;
                 if (!l.touch[k]) l.spring[k].setZero();
-                const Vec3 ft = tangential_force(pair, normal_total / share, n, slide, 0.5 * (w[a] + spin_b).dot(n), reduced, dt,
+                const Vec3 ft = tangential_force(pair, normal_total / share, n, slide, 0.5 * (w[a] + spin_b).dot(n), root_mass, dt,
                                                  weight * share, l.spring[k], s);
                 l.touch[k] = 1;
                 const Vec3 fn = l.force[k] * n;

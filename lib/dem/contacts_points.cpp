@@ -13,7 +13,7 @@ namespace {
 /// where the spring holds kn d1^2/2 (d0 < 0 < d1): the excess -kn d0 d1/2 goes back to the motion; on opening the same is taken.
 /// The dashpot acts for half the step, but should for the part d1/(d1 - d0) of it (opening: no force is left to correct).
 void add_crossing(std::vector<Crossing>& list, Index a, Index b, const PairLaw& pair, double before, double now, double approach,
-                  double reduced_mass, double dt, const Vec3& normal, const Vec3& arm_b, LoopSums& sums)
+                  double root_mass, double dt, const Vec3& normal, const Vec3& arm_b, LoopSums& sums)
 {
     if (before * now >= 0.0) return;
     const double spring = -0.5 * pair.kn * before * now;
@@ -21,8 +21,7 @@ void add_crossing(std::vector<Crossing>& list, Index a, Index b, const PairLaw& 
         list.push_back({a, b, -spring, normal, arm_b});
         return;
     }
-    const double c = 2.0 * pair.damping * std::sqrt(reduced_mass * pair.kn);
-    const double dashpot = c * approach * approach * dt * (now / (now - before) - 0.5);
+    const double dashpot = pair.cn * root_mass * approach * approach * dt * (now / (now - before) - 0.5);
     sums.damping += dashpot;
     list.push_back({a, b, spring - dashpot, normal, arm_b});
 }
@@ -54,11 +53,11 @@ void World::Impl::sphere_loop(double dt)
                 const Vec3 n = length > 0.0 ? Vec3(d / length) : Vec3::UnitZ();
                 const double overlap = reach - length;
                 const Vec3 relative = v[i] - v[j];
-                const double reduced = 1.0 / (inverse_mass[i] + inverse_mass[j]);
+                const double root_mass = std::sqrt(1.0 / (inverse_mass[i] + inverse_mass[j]));
                 const double approach = (v_end[j] - v_end[i]).dot(n);
                 const bool touching = overlap > 0.0;
                 if (touching != (l.touch[k] != 0) && dt > 0.0 && l.touch[k] != 2)
-                    add_crossing(crossing, Index(i), Index(j), pair, reach - (d - relative * dt).norm(), overlap, approach, reduced, dt, n,
+                    add_crossing(crossing, Index(i), Index(j), pair, reach - (d - relative * dt).norm(), overlap, approach, root_mass, dt, n,
                                  Vec3::Zero(), s);
                 if (!touching) {
                     s.friction += 0.5 * pair.kt * l.spring[k].squaredNorm();
@@ -68,10 +67,10 @@ void World::Impl::sphere_loop(double dt)
                 }
                 const double smaller = std::min(ri, rs[j]), cap = options.overlap_cap * smaller;
                 const double pressed = std::min(overlap, cap);
-                const double fn = normal_force(pair.kn * pressed, approach, pair.kn, pair.damping, reduced, dt, s);
+                const double fn = normal_force(pair.kn * pressed, approach, pair, root_mass, dt, s);
                 const double arm_i = ri - 0.5 * overlap, arm_j = rs[j] - 0.5 * overlap;
                 const Vec3 slide = relative - relative.dot(n) * n - (arm_i * w[i] + arm_j * w[j]).cross(n);
-                out->tangential = tangential_force(pair, fn, n, slide, 0.5 * (w[i] + w[j]).dot(n), reduced, dt, 1.0, l.spring[k], s);
+                out->tangential = tangential_force(pair, fn, n, slide, 0.5 * (w[i] + w[j]).dot(n), root_mass, dt, 1.0, l.spring[k], s);
                 out->a = Index(i);
                 out->b = Index(j);
                 out->normal = n;
@@ -117,9 +116,9 @@ void World::Impl::sphere_wall_loop(double dt)
             if (!touching && l.touch[k] == 0) continue;
             const PairLaw& pair = law(material[i], wall.material);
             const Vec3 relative = v[i] - wall.velocity;
-            const double approach = (wall.velocity - v_end[i]).dot(n), reduced = mass[i];
+            const double approach = (wall.velocity - v_end[i]).dot(n), root_mass = std::sqrt(mass[i]);
             if (touching != (l.touch[k] != 0) && dt > 0.0 && facing && l.touch[k] != 2)
-                add_crossing(crossing, Index(i), -1 - l.wall[k], pair, overlap + relative.dot(n) * dt, overlap, approach, reduced, dt, n, Vec3::Zero(), s);
+                add_crossing(crossing, Index(i), -1 - l.wall[k], pair, overlap + relative.dot(n) * dt, overlap, approach, root_mass, dt, n, Vec3::Zero(), s);
             if (!touching) {
                 s.friction += 0.5 * pair.kt * l.spring[k].squaredNorm();
                 l.spring[k].setZero();
@@ -127,10 +126,10 @@ void World::Impl::sphere_wall_loop(double dt)
                 continue;
             }
             const double cap = options.overlap_cap * ri, pressed = std::min(overlap, cap);
-            const double fn = normal_force(pair.kn * pressed, approach, pair.kn, pair.damping, reduced, dt, s);
+            const double fn = normal_force(pair.kn * pressed, approach, pair, root_mass, dt, s);
             const double arm = ri - overlap;
             const Vec3 slide = relative - relative.dot(n) * n - (arm * w[i]).cross(n);
-            out->tangential = tangential_force(pair, fn, n, slide, 0.5 * w[i].dot(n), reduced, dt, 1.0, l.spring[k], s);
+            out->tangential = tangential_force(pair, fn, n, slide, 0.5 * w[i].dot(n), root_mass, dt, 1.0, l.spring[k], s);
             out->a = Index(i);
             out->b = -1 - l.wall[k];
             out->normal = n;
@@ -200,13 +199,13 @@ void World::Impl::sphere_grid_loop(double dt)
             const Vec3 n = q[j] * local_normal;
             const Vec3 arm_j = offset - n * (radius[i] - 0.5 * overlap);  // contact point, from the grid's centre
             const Vec3 relative = v[i] - v[j] - w[j].cross(offset);
-            const double reduced = 1.0 / (inverse_mass[i] + inverse_mass[j]);
+            const double root_mass = std::sqrt(1.0 / (inverse_mass[i] + inverse_mass[j]));
             const double approach = (v_end[j] + w[j].cross(offset) - v_end[i]).dot(n);
             if (touching != (l.touch[k] != 0) && dt > 0.0 && l.touch[k] != 2) {
                 // Where the centre was against the grid a step ago: the rigid motion of the pair taken back.
                 const Vec3 before = q[j].conjugate() * Vec3(offset - relative * dt);
                 const double past = radius[i] - scale[j] * field.sample(before / scale[j]);
-                add_crossing(crossing, Index(i), Index(j), pair, past, overlap, approach, reduced, dt, n, offset, s);
+                add_crossing(crossing, Index(i), Index(j), pair, past, overlap, approach, root_mass, dt, n, offset, s);
             }
             if (!touching) {
                 for (int slot = 0; slot < Slots::count; ++slot)
@@ -216,13 +215,13 @@ void World::Impl::sphere_grid_loop(double dt)
                 continue;
             }
             const double cap = options.overlap_cap * radius[i], pressed = std::min(overlap, cap);
-            const double fn = normal_force(pair.kn * pressed * slope, approach, pair.kn, pair.damping, reduced, dt, s);
+            const double fn = normal_force(pair.kn * pressed * slope, approach, pair, root_mass, dt, s);
             const double arm_i = radius[i] - 0.5 * overlap;
             const Vec3 velocity = v[i] - v[j] - arm_i * w[i].cross(n) - w[j].cross(arm_j);
             const Vec3 slide = velocity - n.dot(velocity) * n;
             Slots& slots = l.slots[k];
             const int slot = slot_of(slots, local_normal);
-            const Vec3 ft = tangential_force(pair, fn, n, slide, 0.5 * (w[i] + w[j]).dot(n), reduced, dt, 1.0, slots.spring[slot], s);
+            const Vec3 ft = tangential_force(pair, fn, n, slide, 0.5 * (w[i] + w[j]).dot(n), root_mass, dt, 1.0, slots.spring[slot], s);
             out->a = Index(i);
             out->b = Index(j);
             out->points = 1;

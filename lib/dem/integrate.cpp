@@ -16,7 +16,9 @@ void turn_sphere(Quat& q, const Vec3& turn)
     const Vec3 h = 0.5 * turn;
     const Quat step(1.0, h.x(), h.y(), h.z());
     q = step * q;
-    q.normalize();
+    const double length2 = q.squaredNorm();
+    if (std::abs(length2 - 1.0) < 1e-4) q.coeffs() *= 1.5 - 0.5 * length2;  // one Newton step of 1/sqrt, no root and no division
+    else q.normalize();
 }
 
 /// Rotates the body-frame angular momentum about axis k by the flow of b_k^2/(2 I_k) over time t; `turn` gathers the rotation of the body.
@@ -75,28 +77,30 @@ void World::Impl::check_step(double dt) const
                     "use " + to_text(options.step_fraction * critical) + " s (automatic) or a smaller stiffness");
 }
 
-void World::Impl::kick(double dt, bool foresee)
+// Kick of one body over dt.
+inline void World::Impl::kick_body(std::size_t i, double dt, const Vec3& g_dt)
+{
+    if (i < added_mass.size() && added_mass[i] != Vec3::Zero())
+        kick_with_added_mass(i, dt);
+    else if (any_external)
+        v[i] += (inverse_mass[i] * dt) * (force[i] + external_force[i]) + g_dt;
+    else
+        v[i] += (inverse_mass[i] * dt) * force[i] + g_dt;
+    Vec3 impulse = dt * torque[i];
+    if (any_external) impulse += dt * external_torque[i];
+    if (is_grid[i]) {
+        momentum[i] += impulse;
+        update_spin(i);
+    } else {
+        w[i] += inverse_inertia[i] * impulse;
+    }
+}
+
+void World::Impl::kick(double dt)
 {
     const Vec3 g_dt = options.gravity * dt;
-    for (std::size_t i = 0; i < x.size(); ++i) {
-        if (inverse_mass[i] == 0.0) {
-            if (foresee) v_end[i] = v[i];
-            continue;
-        }
-        const Vec3 before = v[i];
-        if (i < added_mass.size() && added_mass[i] != Vec3::Zero())
-            kick_with_added_mass(i, dt);
-        else
-            v[i] += (inverse_mass[i] * dt) * (force[i] + external_force[i]) + g_dt;
-        if (foresee) v_end[i] = 2.0 * v[i] - before;
-        const Vec3 impulse = dt * (torque[i] + external_torque[i]);
-        if (is_grid[i]) {
-            momentum[i] += impulse;
-            update_spin(i);
-        } else {
-            w[i] += inverse_inertia[i] * impulse;
-        }
-    }
+    for (std::size_t i = 0; i < x.size(); ++i)
+        if (inverse_mass[i] > 0.0) kick_body(i, dt, g_dt);
 }
 
 // (m + added) dv = dt (forces + m g), component by component. The energy that the added mass takes up counts as work done outside.
@@ -108,31 +112,61 @@ void World::Impl::kick_with_added_mass(std::size_t i, double dt)
     external_work -= 0.5 * added_mass[i].dot(v[i].cwiseAbs2() - before.cwiseAbs2());
 }
 
-void World::Impl::drift(double dt)
+// First kick, way and turn of every body in one pass over memory; returns whether the neighbour lists are worn out.
+bool World::Impl::kick_and_drift(double dt)
 {
-    double finite = 0.0;
+    const Vec3 half_g = 0.5 * dt * options.gravity;
+    const double limit = free_path * skin, limit2 = limit * limit;
+    double finite = 0.0, gravity_way = 0.0, external = 0.0;
+    bool expired = false;
     for (std::size_t i = 0; i < x.size(); ++i) {
-        if (!in[i] || motion[i] == Motion::fixed) continue;
+        if (!in[i]) continue;
+        if (motion[i] != Motion::free) {
+            v_end[i] = v[i];
+            if (motion[i] == Motion::fixed) continue;
+        } else {
+            const Vec3 before = v[i];
+            kick_body(i, 0.5 * dt, half_g);
+            v_end[i] = 2.0 * v[i] - before;
+        }
         const Vec3 way = dt * v[i];
         x[i] += way;
         finite += v[i].squaredNorm() + w[i].squaredNorm();
         if (motion[i] == Motion::free) {
-            gravity_work += mass[i] * options.gravity.dot(way);
-            external_work += external_force[i].dot(way) + dt * external_torque[i].dot(w[i]);
+            gravity_way += mass[i] * options.gravity.dot(way);
+            if (any_external) external += external_force[i].dot(way) + dt * external_torque[i].dot(w[i]);
         }
+        const double moved2 = (x[i] - x_reference[i]).squaredNorm();
+        expired = expired || moved2 > limit2;
         if (!is_grid[i]) {
             turn_sphere(q[i], dt * w[i]);
-        } else if (motion[i] == Motion::free) {
-            const Quat& frame = shapes[std::size_t(shape[i])]->principal_rotation();
-            q[i] = free_rotation(q[i] * frame, momentum[i], principal[i], dt) * frame.conjugate();
-            update_spin(i);
-        } else {
-            const double angle = w[i].norm() * dt;
-            if (angle > 0.0) q[i] = (Quat(Eigen::AngleAxisd(angle, w[i].normalized())) * q[i]).normalized();
+            continue;
         }
+        turn_grid(i, dt);
+        // |q - q'| is half the angle for small turns; either sign of q is the same turn.
+        const double turn = 2.0 * std::min((q[i].coeffs() - q_reference[i].coeffs()).norm(), (q[i].coeffs() + q_reference[i].coeffs()).norm());
+        expired = expired || std::sqrt(moved2) + turn * radius[i] > limit;
     }
-    for (WallData& wall : walls) wall.point += dt * wall.velocity;
+    gravity_work += gravity_way;
+    external_work += external;
+    for (WallData& wall : walls) {
+        wall.point += dt * wall.velocity;
+        expired = expired || (wall.point - wall.reference).squaredNorm() > limit2;
+    }
     if (!std::isfinite(finite)) check_numbers();
+    return expired;
+}
+
+void World::Impl::turn_grid(std::size_t i, double dt)
+{
+    if (motion[i] == Motion::free) {
+        const Quat& frame = shapes[std::size_t(shape[i])]->principal_rotation();
+        q[i] = free_rotation(q[i] * frame, momentum[i], principal[i], dt) * frame.conjugate();
+        update_spin(i);
+        return;
+    }
+    const double angle = w[i].norm() * dt;
+    if (angle > 0.0) q[i] = (Quat(Eigen::AngleAxisd(angle, w[i].normalized())) * q[i]).normalized();
 }
 
 void World::Impl::check_numbers() const
@@ -147,7 +181,7 @@ void World::Impl::check_numbers() const
 void World::Impl::constraint_work(double dt)
 {
     for (const WallData& wall : walls) wall_work -= 0.5 * dt * wall.force.dot(wall.velocity);
-    for (std::size_t i = 0; i < x.size(); ++i)
+    for (std::size_t i = 0; any_prescribed && i < x.size(); ++i)
         if (in[i] && motion[i] == Motion::prescribed) wall_work -= 0.5 * dt * (force[i].dot(v[i]) + torque[i].dot(w[i]));
 }
 
@@ -199,14 +233,12 @@ void World::Impl::step(double dt)
     }
     auto start = std::chrono::steady_clock::now();
     constraint_work(dt);
-    kick(0.5 * dt, true);
-    drift(dt);
-    const bool expired = lists_expired();
+    const bool expired = kick_and_drift(dt);
     counters.seconds_integration += seconds_since(start);
     if (expired) make_lists();
     compute_contacts(dt);
     start = std::chrono::steady_clock::now();
-    kick(0.5 * dt, false);
+    kick(0.5 * dt);
     correct_crossings();
     constraint_work(dt);
     time += dt;

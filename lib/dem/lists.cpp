@@ -10,10 +10,6 @@ namespace coral::dem {
 
 namespace {
 
-/// Share of the skin that a body may move before the lists are made anew: below one half, for trilinear distances may rise
-/// a little faster than the way.
-constexpr double free_path = 0.4;
-
 std::uint64_t key_of(Index a, Index b) { return std::uint64_t(std::uint32_t(a)) << 32 | std::uint32_t(b); }
 
 void make_sphere_list(World::Impl& world, const std::vector<BroadPair>& pairs)
@@ -127,10 +123,15 @@ void append_nodes(const World::Impl& world, Index slave, double skin, const Dist
     const Shape& shape = *world.shapes[std::size_t(world.shape[a])];
     const double scale = world.scale[a];
     const Eigen::Matrix3d rotation = scale * world.q[a].toRotationMatrix();
-    for (const Shape::Cluster& cluster : shape.clusters()) {
-        if (distance(rotation * cluster.centre) > 1.05 * scale * cluster.radius + skin) continue;
-        for (int n = cluster.begin; n < cluster.end; ++n)
-            if (distance(rotation * shape.nodes()[std::size_t(n)]) < skin) found.push_back(n);
+    const auto near = [&](const Shape::Cluster& c) { return distance(rotation * c.centre) <= 1.05 * scale * c.radius + skin; };
+    for (const Shape::Cluster& group : shape.groups()) {
+        if (!near(group)) continue;
+        for (int c = group.begin; c < group.end; ++c) {
+            const Shape::Cluster& cluster = shape.clusters()[std::size_t(c)];
+            if (!near(cluster)) continue;
+            for (int n = cluster.begin; n < cluster.end; ++n)
+                if (distance(rotation * shape.nodes()[std::size_t(n)]) < skin) found.push_back(n);
+        }
     }
 }
 

@@ -15,7 +15,7 @@ namespace coral::dem {
 
 namespace {
 
-constexpr int nodes_per_cluster = 12;
+constexpr int nodes_per_cluster = 12, clusters_per_group = 12;
 
 /// Bits of a 10-bit number spread to every third place.
 std::uint32_t spread(std::uint32_t v)
@@ -130,6 +130,13 @@ void Shape::sort_nodes()
         for (int i = c.begin; i < c.end; ++i) c.centre += nodes_[std::size_t(i)] / (c.end - c.begin);
         for (int i = c.begin; i < c.end; ++i) c.radius = std::max(c.radius, (nodes_[std::size_t(i)] - c.centre).norm());
         clusters_.push_back(c);
+    }
+    for (int begin = 0; begin < int(clusters_.size()); begin += clusters_per_group) {
+        Cluster g{Eigen::Vector3d::Zero(), 0.0, begin, std::min(begin + clusters_per_group, int(clusters_.size()))};
+        for (int i = g.begin; i < g.end; ++i) g.centre += clusters_[std::size_t(i)].centre / (g.end - g.begin);
+        for (int i = g.begin; i < g.end; ++i)
+            g.radius = std::max(g.radius, (clusters_[std::size_t(i)].centre - g.centre).norm() + clusters_[std::size_t(i)].radius);
+        groups_.push_back(g);
     }
 }
 

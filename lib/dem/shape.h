@@ -66,6 +66,8 @@ public:
         int begin, end;
     };
     std::span<const Cluster> clusters() const { return clusters_; }
+    /// Runs of clusters within a ball; begin and end count clusters.
+    std::span<const Cluster> groups() const { return groups_; }
 
 private:
     Shape() = default;
@@ -79,7 +81,7 @@ private:
     std::shared_ptr<const sdf::DistanceGrid> grid_;
     std::vector<Eigen::Vector3d> nodes_;
     std::vector<double> node_areas_;
-    std::vector<Cluster> clusters_;
+    std::vector<Cluster> clusters_, groups_;
 };
 
 }  // namespace coral::dem

@@ -67,10 +67,10 @@ struct Reader {
 template <class Archive>
 void visit_state(World::Impl& m, Archive& io)
 {
-    io(m.x), io(m.v), io(m.v_end), io(m.w), io(m.momentum), io(m.q), io(m.force), io(m.torque), io(m.external_force), io(m.external_torque);
+    io(m.x), io(m.v), io(m.v_end), io(m.w), io(m.momentum), io(m.q), io(m.force), io(m.torque), io(m.external_force), io(m.external_torque), io(m.added_mass);
     io(m.scale), io(m.density), io(m.shape), io(m.material), io(m.motion), io(m.in);
     for (WallData& wall : m.walls) io(wall.point), io(wall.velocity), io(wall.force), io(wall.reference);
-    io(m.options.gravity), io(m.active), io(m.lists_valid), io(m.forces_valid), io(m.skin), io(m.x_reference), io(m.q_reference);
+    io(m.options.gravity), io(m.any_external), io(m.active), io(m.lists_valid), io(m.forces_valid), io(m.skin), io(m.x_reference), io(m.q_reference);
     SphereList& s = m.spheres;
     io(s.row), io(s.other), io(s.spring), io(s.touch), io(s.out), io(s.rows);
     SphereWallList& w = m.sphere_walls;

@@ -41,7 +41,10 @@ void World::Impl::update_laws()
         for (std::size_t b = 0; b < n; ++b) {
             const Material &s = materials[a], &t = materials[b];
             laws[a * n + b] = {harmonic(s.normal_stiffness, t.normal_stiffness), harmonic(s.tangential_stiffness, t.tangential_stiffness),
-                               std::min(s.friction, t.friction), 0.5 * (s.damping + t.damping)};
+                               std::min(s.friction, t.friction), 0.5 * (s.damping + t.damping), 0.0, 0.0};
+            PairLaw& law = laws[a * n + b];
+            law.cn = 2.0 * law.damping * std::sqrt(law.kn);
+            law.ct = 2.0 * law.damping * std::sqrt(law.kt);
         }
 }
 
@@ -54,6 +57,7 @@ void World::Impl::update_mass(std::size_t i)
     principal[i] = density[i] * std::pow(c, 5) * s.principal_inertia();
     radius[i] = c * (is_grid[i] ? s.bounding_radius() : s.radius());
     equivalent[i] = c * s.equivalent_radius();
+    any_prescribed = any_prescribed || motion[i] == Motion::prescribed;
     const bool moves = free(i);
     inverse_mass[i] = moves ? 1.0 / mass[i] : 0.0;
     inverse_inertia[i] = moves ? 1.0 / principal[i].x() : 0.0;
@@ -315,6 +319,7 @@ void World::set_shape(int body, int shape, double scale)
 
 void World::set_external_force(int body, const Vec3& force, const Vec3& torque)
 {
+    impl_->any_external = impl_->any_external || !force.isZero(0.0) || !torque.isZero(0.0);
     impl_->external_force[at(body)] = force;
     impl_->external_torque[at(body)] = torque;
 }
@@ -329,6 +334,7 @@ void World::clear_external_forces()
 {
     std::fill(impl_->external_force.begin(), impl_->external_force.end(), Vec3::Zero());
     std::fill(impl_->external_torque.begin(), impl_->external_torque.end(), Vec3::Zero());
+    impl_->any_external = false;
 }
 
 // ---- Walls, settings, time ----

@@ -68,7 +68,7 @@ TEST(SphereContact, thousand_bounces_on_a_plane_under_gravity_keep_the_height)
     World world = quiet_world(0.0, 0.0, {0, 0, -g});
     const int shape = world.add_shape(Shape::sphere());
     world.add_plane(Vec3::Zero(), Vec3::UnitZ());
-    const double h = 1e-4;
+    const double h = 1e-5;
     add_sphere(world, shape, 2e-3, {0, 0, 1e-3 + h});
     const double period = 2.0 * std::sqrt(2.0 * h / g);
     world.advance(1000 * period);

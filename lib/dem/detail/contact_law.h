@@ -14,6 +14,7 @@ using Vec3 = Eigen::Vector3d;
 /// Two materials in contact.
 struct PairLaw {
     double kn = 0, kt = 0, friction = 0, damping = 0;
+    double cn = 0, ct = 0;  ///< 2 zeta sqrt(kn), 2 zeta sqrt(kt); times sqrt(m*) they are the dashpots
 };
 
 /// Energies of the contacts of a block of the loop; summed block by block, in order.
@@ -40,10 +41,10 @@ struct LoopSums {
 /// \param elastic   elastic part kn delta (times |grad Phi|) [N]
 /// \param approach  v_a at the end of the step, foreseen with the accelerations of its start: with the velocity of the middle
 ///                  the damping would lag half a step behind the spring, and stiffen it by zeta omega dt
-inline double normal_force(double elastic, double approach, double kn, double damping, double reduced_mass, double dt, LoopSums& sums)
+inline double normal_force(double elastic, double approach, const PairLaw& law, double root_mass, double dt, LoopSums& sums)
 {
-    if (damping == 0.0) return elastic;
-    const double drag = 2.0 * damping * std::sqrt(reduced_mass * kn) * approach;
+    if (law.cn == 0.0) return elastic;
+    const double drag = law.cn * root_mass * approach;
     if (elastic + drag <= 0.0) {
         // The clamp lets the spring relax without pushing: what it held is lost at the rate it relaxes.
         sums.damping -= elastic * approach * dt;
@@ -56,9 +57,10 @@ inline double normal_force(double elastic, double approach, double kn, double da
 /// Advances a friction spring and returns the tangential force on the first body:
 ///     s turns with the pair, s += v_t dt, |s| <= mu fn/kt;  F_t = -kt s - c_t v_t while it sticks, |F_t| <= mu fn
 /// \param velocity  tangential velocity of the first body against the second [m/s]
+/// \param root_mass  sqrt(m*)
 /// \param twist     mean spin of the pair about the normal [rad/s]
 /// \param share     part of the pair's force that this spring carries (1 for one-point contacts)
-inline Vec3 tangential_force(const PairLaw& law, double fn, const Vec3& n, const Vec3& velocity, double twist, double reduced_mass, double dt,
+[[gnu::always_inline]] inline Vec3 tangential_force(const PairLaw& law, double fn, const Vec3& n, const Vec3& velocity, double twist, double root_mass, double dt,
                              double share, Vec3& spring, LoopSums& sums)
 {
     if (law.friction == 0.0 || law.kt == 0.0) {
@@ -85,7 +87,7 @@ inline Vec3 tangential_force(const PairLaw& law, double fn, const Vec3& n, const
     sums.elastic_tangential += 0.5 * law.kt * share * stretched2;
     Vec3 force = -law.kt * spring;
     if (law.damping > 0.0) {
-        const Vec3 drag = -2.0 * law.damping * std::sqrt(reduced_mass * law.kt) * velocity;
+        const Vec3 drag = (-law.ct * root_mass) * velocity;
         Vec3 total = force + drag;
         const double size2 = total.squaredNorm(), bound = law.friction * fn;
         if (size2 > bound * bound) total *= bound / std::sqrt(size2);

@@ -93,6 +93,10 @@ struct NodeList {
     std::vector<GeneralForce> out;
 };
 
+/// Share of the skin that a body may move before the lists are made anew: below one half, for trilinear distances may rise
+/// a little faster than the way.
+constexpr double free_path = 0.4;
+
 constexpr std::size_t row_grain = 256, entry_grain = 512, grid_grain = 256, node_grain = 4;
 
 struct World::Impl {
@@ -119,6 +123,7 @@ struct World::Impl {
     std::vector<std::uint8_t> in, is_grid;
     std::vector<std::string> role;
     int active = 0;
+    bool any_external = false, any_prescribed = false;
 
     // Lists.
     bool lists_valid = false, forces_valid = false;
@@ -171,9 +176,11 @@ struct World::Impl {
 
     // integrate.cpp
     void check_step(double dt) const;
-    void kick(double dt, bool foresee);
+    void kick(double dt);
+    void kick_body(std::size_t i, double dt, const Vec3& g_dt);
     void kick_with_added_mass(std::size_t i, double dt);
-    void drift(double dt);
+    bool kick_and_drift(double dt);
+    void turn_grid(std::size_t i, double dt);
     void correct_crossings();
     void check_numbers() const;
     void constraint_work(double dt);
