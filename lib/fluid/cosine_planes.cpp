@@ -24,11 +24,26 @@ struct Complex {
 };
 using Buffer = std::vector<Complex, CacheAligned<Complex>>;
 
-inline Complex operator+(Complex a, Complex b) { return {a.re + b.re, a.im + b.im}; }
-inline Complex operator-(Complex a, Complex b) { return {a.re - b.re, a.im - b.im}; }
-inline Complex operator*(Complex a, Complex b) { return {a.re * b.re - a.im * b.im, a.re * b.im + a.im * b.re}; }
-inline Complex conj(Complex a) { return {a.re, -a.im}; }
-inline Complex times_i(Complex a) { return {-a.im, a.re}; }
+inline Complex operator+(Complex a, Complex b)
+{
+    return {a.re + b.re, a.im + b.im};
+}
+inline Complex operator-(Complex a, Complex b)
+{
+    return {a.re - b.re, a.im - b.im};
+}
+inline Complex operator*(Complex a, Complex b)
+{
+    return {a.re * b.re - a.im * b.im, a.re * b.im + a.im * b.re};
+}
+inline Complex conj(Complex a)
+{
+    return {a.re, -a.im};
+}
+inline Complex times_i(Complex a)
+{
+    return {-a.im, a.re};
+}
 
 /// Order and twiddles of one direction: sample s of the real sequence is entry place[s] of the complex one.
 struct Direction {
@@ -44,7 +59,8 @@ struct Direction {
     }
 };
 
-/// C(k) = w V(k) + w* V(n-k), C(n-k) = i (w V(k) - w* V(n-k)): holds for two real sequences packed as one, because it is linear.
+/// C(k) = w V(k) + w* V(n-k), C(n-k) = i (w V(k) - w* V(n-k)): holds for two real sequences packed as one, because it
+/// is linear.
 inline void to_cosine(Complex w, Complex& low, Complex& high)
 {
     const Complex p = w * low, q = conj(w) * high;

@@ -15,7 +15,10 @@ double ergun_factor(double eps, double reynolds)
     return (150.0 * (1.0 - eps) + 1.75 * reynolds) / (18.0 * eps * eps);
 }
 
-double wen_yu_factor(double eps, double reynolds) { return single_sphere_drag_factor(reynolds) * std::pow(eps, -3.65); }
+double wen_yu_factor(double eps, double reynolds)
+{
+    return single_sphere_drag_factor(reynolds) * std::pow(eps, -3.65);
+}
 
 }  // namespace
 
@@ -25,7 +28,8 @@ DragLaw drag_law_from_name(const std::string& name)
     if (name == "ergun") return DragLaw::ergun;
     if (name == "wen-yu") return DragLaw::wen_yu;
     if (name == "schiller-naumann") return DragLaw::schiller_naumann;
-    throw UsageError("fluid.drag", "unknown drag law '" + name + "'", "use gidaspow, ergun, wen-yu or schiller-naumann");
+    throw UsageError("fluid.drag", "unknown drag law '" + name + "'",
+                     "use gidaspow, ergun, wen-yu or schiller-naumann");
 }
 
 double single_sphere_drag_factor(double reynolds)
@@ -37,10 +41,14 @@ double single_sphere_drag_factor(double reynolds)
 double drag_factor(DragLaw law, double eps, double reynolds)
 {
     switch (law) {
-        case DragLaw::ergun: return ergun_factor(eps, reynolds);
-        case DragLaw::wen_yu: return wen_yu_factor(eps, reynolds);
-        case DragLaw::schiller_naumann: return single_sphere_drag_factor(reynolds);
-        case DragLaw::gidaspow: break;
+        case DragLaw::ergun:
+            return ergun_factor(eps, reynolds);
+        case DragLaw::wen_yu:
+            return wen_yu_factor(eps, reynolds);
+        case DragLaw::schiller_naumann:
+            return single_sphere_drag_factor(reynolds);
+        case DragLaw::gidaspow:
+            break;
     }
     const double wen_yu_share = std::clamp((eps - 0.75) / 0.1, 0.0, 1.0);
     double factor = 0.0;

@@ -2,16 +2,17 @@
 /// \file fluid/drag.h
 /// Drag laws of particles smaller than a few cells.
 /// Force on a particle: F = b (u - v), b = 3 pi eps rho nu d fhat(eps, Re), with u the interstitial fluid velocity and
-/// Re = eps |u - v| d / nu (superficial slip: only then does Gidaspow's dense branch reproduce Ergun [Huang et al., eq. 12-14]).
-/// The force of the pressure gradient, -V grad p, is separate (model A).
+/// Re = eps |u - v| d / nu (superficial slip: only then does Gidaspow's dense branch reproduce Ergun [Huang et al., eq.
+/// 12-14]). The force of the pressure gradient, -V grad p, is separate (model A).
 #include <string>
 
 namespace coral::fluid {
 
 enum class DragLaw {
-    gidaspow,          ///< Ergun below a void fraction of 0.75, Wen-Yu above 0.85, blended in between (the plain switch at 0.8 jumps by 15 %)
-    ergun,             ///< Ergun 1952 at any void fraction
-    wen_yu,            ///< Wen and Yu 1966: single-particle drag times eps^-3.65
+    gidaspow,  ///< Ergun below a void fraction of 0.75, Wen-Yu above 0.85, blended in between (the plain switch at 0.8
+               ///< jumps by 15 %)
+    ergun,     ///< Ergun 1952 at any void fraction
+    wen_yu,    ///< Wen and Yu 1966: single-particle drag times eps^-3.65
     schiller_naumann,  ///< one particle alone; the void fraction is ignored
 };
 

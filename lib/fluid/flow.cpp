@@ -52,7 +52,8 @@ Flow::Flow(const GridSpec& grid, const FlowOptions& options) : grid_(grid), layo
     if (!(options.density > 0.0)) throw UsageError("fluid.density", "is not positive", "water has 1000 kg/m3");
     if (!(options.kinematic_viscosity > 0.0))
         throw UsageError("fluid.kinematic_viscosity", "is not positive", "water has 1e-6 m2/s");
-    if (!(options.cfl > 0.0 && options.cfl <= 0.8)) throw UsageError("time.cfl", "is outside (0, 0.8]", "0.5 is a good choice");
+    if (!(options.cfl > 0.0 && options.cfl <= 0.8))
+        throw UsageError("time.cfl", "is outside (0, 0.8]", "0.5 is a good choice");
     poisson_ = std::make_shared<const Poisson>(grid);
     for (int axis = 0; axis < 3; ++axis) {
         velocity_[axis] = layout_.make_field();
@@ -121,19 +122,22 @@ void Flow::find_fluid_mass()
 {
     for (int axis = 0; axis < 3; ++axis) {
         const FaceRange range(grid_, axis);
-        fluid_mass_[axis] = parallel_sum(range.planes(), planes_per_block, 0.0, [&](std::size_t begin, std::size_t end) {
-            double sum = 0.0;
-            for (int k = range.low.z() + int(begin); k < range.low.z() + int(end); ++k)
-                for (int j = range.low.y(); j < range.high.y(); ++j) {
-                    const std::size_t f0 = layout_.index(range.low.x(), j, k);
-                    const double* high = has_fines_ ? porous_.void_fraction.data() + f0 : nullptr;
-                    const double* low = has_fines_ ? high - layout_.stride[axis] : nullptr;
-                    sum += has_fines_ ? detail::weighted_row(grid_, axis, range, j, k, add_lanes,
-                                                             [&](std::ptrdiff_t i) { return 0.5 * (low[i] + high[i]); })
-                                      : detail::weighted_row(grid_, axis, range, j, k, add_lanes, [](std::ptrdiff_t) { return 1.0; });
-                }
-            return sum;
-        });
+        fluid_mass_[axis] =
+            parallel_sum(range.planes(), planes_per_block, 0.0, [&](std::size_t begin, std::size_t end) {
+                double sum = 0.0;
+                for (int k = range.low.z() + int(begin); k < range.low.z() + int(end); ++k)
+                    for (int j = range.low.y(); j < range.high.y(); ++j) {
+                        const std::size_t f0 = layout_.index(range.low.x(), j, k);
+                        const double* high = has_fines_ ? porous_.void_fraction.data() + f0 : nullptr;
+                        const double* low = has_fines_ ? high - layout_.stride[axis] : nullptr;
+                        sum += has_fines_
+                                   ? detail::weighted_row(grid_, axis, range, j, k, add_lanes,
+                                                          [&](std::ptrdiff_t i) { return 0.5 * (low[i] + high[i]); })
+                                   : detail::weighted_row(grid_, axis, range, j, k, add_lanes,
+                                                          [](std::ptrdiff_t) { return 1.0; });
+                    }
+                return sum;
+            });
     }
     fluid_mass_ *= options_.density * grid_.cell_volume();
 }
@@ -152,9 +156,11 @@ Eigen::Vector3d Flow::total_momentum() const
                     const double* row = u + f0;
                     const double* high = has_fines_ ? porous_.void_fraction.data() + f0 : nullptr;
                     const double* low = has_fines_ ? high - layout_.stride[axis] : nullptr;
-                    sum += has_fines_ ? detail::weighted_row(grid_, axis, range, j, k, add_lanes,
-                                                             [&](std::ptrdiff_t i) { return 0.5 * (low[i] + high[i]) * row[i]; })
-                                      : detail::weighted_row(grid_, axis, range, j, k, add_lanes, [&](std::ptrdiff_t i) { return row[i]; });
+                    sum += has_fines_ ? detail::weighted_row(
+                                            grid_, axis, range, j, k, add_lanes,
+                                            [&](std::ptrdiff_t i) { return 0.5 * (low[i] + high[i]) * row[i]; })
+                                      : detail::weighted_row(grid_, axis, range, j, k, add_lanes,
+                                                             [&](std::ptrdiff_t i) { return row[i]; });
                 }
             return sum;
         });
@@ -178,7 +184,8 @@ void Flow::solve_increment(double dt)
                 if (!has_fines_) {
                     for (std::ptrdiff_t i = 0; i < n; ++i) {
                         const std::ptrdiff_t c = c0 + i;
-                        b[i] = scale * ((us[0][c + 1] - us[0][c]) + (us[1][c + s[1]] - us[1][c]) + (us[2][c + s[2]] - us[2][c]));
+                        b[i] = scale * ((us[0][c + 1] - us[0][c]) + (us[1][c + s[1]] - us[1][c]) +
+                                        (us[2][c + s[2]] - us[2][c]));
                     }
                     continue;
                 }
@@ -208,7 +215,9 @@ double Flow::correct_row(int axis, const FaceRange& range, int j, int k, double 
     double* __restrict u = velocity_[axis].data() + f0;
     const double* eps = has_fines_ ? porous_.void_fraction.data() + f0 : nullptr;
     const auto face_eps = [&](std::ptrdiff_t i) { return eps ? 0.5 * (eps[i] + eps[i - own]) : 1.0; };
-    const auto row_of = [&](int jj, int kk) { return pi + std::size_t(kk) * poisson_->plane() + std::size_t(jj) * poisson_->row(); };
+    const auto row_of = [&](int jj, int kk) {
+        return pi + std::size_t(kk) * poisson_->plane() + std::size_t(jj) * poisson_->row();
+    };
     const int n = grid_.cells[axis];
     if (axis == 0) {
         const double* row = row_of(j, k);
@@ -230,12 +239,14 @@ double Flow::correct_row(int axis, const FaceRange& range, int j, int k, double 
         const double low_sign = position == 0 && !grid_.periodic(axis) ? -1.0 : 1.0;
         const std::ptrdiff_t m = range.row_length();
         if (eps)
-            for (std::ptrdiff_t i = 0; i < m; ++i) u[i] = us[i] - factor * (high_sign * high[i] - low_sign * low[i]) / face_eps(i);
+            for (std::ptrdiff_t i = 0; i < m; ++i)
+                u[i] = us[i] - factor * (high_sign * high[i] - low_sign * low[i]) / face_eps(i);
         else
             for (std::ptrdiff_t i = 0; i < m; ++i) u[i] = us[i] - factor * (high_sign * high[i] - low_sign * low[i]);
     }
     if (eps)
-        return detail::weighted_row(grid_, axis, range, j, k, add_lanes, [&](std::ptrdiff_t i) { return face_eps(i) * u[i]; });
+        return detail::weighted_row(grid_, axis, range, j, k, add_lanes,
+                                    [&](std::ptrdiff_t i) { return face_eps(i) * u[i]; });
     return detail::weighted_row(grid_, axis, range, j, k, add_lanes, [&](std::ptrdiff_t i) { return u[i]; });
 }
 
@@ -272,7 +283,8 @@ void Flow::diagnose()
     const double* u[3] = {velocity_[0].data(), velocity_[1].data(), velocity_[2].data()};
     const double* eps = porous_.void_fraction.data();
     const double* J[3] = {porous_.solid_flux[0].data(), porous_.solid_flux[1].data(), porous_.solid_flux[2].data()};
-    std::vector<Eigen::Vector2d> largest((std::size_t(grid_.cells.z()) + planes_per_block - 1) / planes_per_block, {0.0, 0.0});
+    std::vector<Eigen::Vector2d> largest((std::size_t(grid_.cells.z()) + planes_per_block - 1) / planes_per_block,
+                                         {0.0, 0.0});
     parallel_blocks(std::size_t(grid_.cells.z()), planes_per_block, [&](std::size_t begin, std::size_t end) {
         Eigen::Vector2d& block = largest[begin / planes_per_block];
         for (int k = int(begin); k < int(end); ++k)
@@ -295,13 +307,15 @@ void Flow::diagnose()
                     double sum = 0.0;
                     for (int d = 0; d < 3; ++d) {
                         const std::ptrdiff_t c = c0 + i, next = c + s[d];
-                        sum += 0.5 * (eps[c] + eps[next]) * u[d][next] - 0.5 * (eps[c - s[d]] + eps[c]) * u[d][c] + J[d][next] - J[d][c];
+                        sum += 0.5 * (eps[c] + eps[next]) * u[d][next] - 0.5 * (eps[c - s[d]] + eps[c]) * u[d][c] +
+                               J[d][next] - J[d][c];
                     }
                     return std::abs(sum);
                 };
                 const std::ptrdiff_t n = grid_.cells.x();
                 block[0] = std::max(block[0], detail::lane_max(n, speed));
-                block[1] = std::max(block[1], has_fines_ ? detail::lane_max(n, porous_divergence) : detail::lane_max(n, divergence));
+                block[1] = std::max(
+                    block[1], has_fines_ ? detail::lane_max(n, porous_divergence) : detail::lane_max(n, divergence));
             }
     });
     mass_ = MassTally{};
@@ -350,7 +364,8 @@ FlowState Flow::save() const
 void Flow::restore(const FlowState& state)
 {
     const auto fits = [&](const Field& f) { return f.size() == layout_.total; };
-    bool whole = fits(state.pressure) && state.scalars.size() == 16 && (state.void_fraction.empty() || fits(state.void_fraction));
+    bool whole = fits(state.pressure) && state.scalars.size() == 16 &&
+                 (state.void_fraction.empty() || fits(state.void_fraction));
     for (int axis = 0; axis < 3; ++axis) whole = whole && fits(state.velocity[axis]) && fits(state.previous_rate[axis]);
     if (!whole) throw Error("flow state", "belongs to another grid", "resume with the case that wrote it");
     velocity_ = state.velocity;

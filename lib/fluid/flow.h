@@ -5,16 +5,16 @@
 ///     eps (du/dt + u.grad u) = -eps grad p + div(eps nu grad u) + eps f + (drag reaction of the fines)/rho
 ///     div(eps u + J_s) = 0
 ///
-/// u is the interstitial velocity [m/s], p the kinematic pressure (dynamic pressure / density) [m2/s2], eps the void fraction
-/// (1 without fines and inside resolved grains), J_s the volume flux of the fines [m/s].
-/// Adams-Bashforth 2 (Euler on the first step), third-order upwind-biased convection, explicit viscosity, one incremental
+/// u is the interstitial velocity [m/s], p the kinematic pressure (dynamic pressure / density) [m2/s2], eps the void
+/// fraction (1 without fines and inside resolved grains), J_s the volume flux of the fines [m/s]. Adams-Bashforth 2
+/// (Euler on the first step), third-order upwind-biased convection, explicit viscosity, one incremental
 /// constant-coefficient projection a step. A step of a coupled run is, in order:
 ///
 ///     dt = flow.stable_time_step()
 ///     fines.deposit(...)                       porosity, J_s, drag fields (fluid/porous.h); leave out without fines
 ///     flow.predict(dt)                         u* = everything but the grains' forcing and the new pressure
-///     fines.add_drag_lag(...)                  what the semi-implicit drag took from the fluid beyond the explicit force
-///     bodies.measure(flow, dt, old motions)    force and torque on resolved grains (fluid/immersed.h)
+///     fines.add_drag_lag(...)                  what the semi-implicit drag took from the fluid beyond the explicit
+///     force bodies.measure(flow, dt, old motions)    force and torque on resolved grains (fluid/immersed.h)
 ///     ... contact solver moves grains and fines ...
 ///     bodies.apply(flow, new motions)          forcing of u*
 ///     flow.project(dt)                         pressure increment, new u and p, boundary rows
@@ -34,22 +34,23 @@ enum class Convection {
 };
 
 struct FlowOptions {
-    double density = 1000.0;                                    ///< [kg/m3]
-    double kinematic_viscosity = 1e-6;                          ///< [m2/s]
+    double density = 1000.0;                                      ///< [kg/m3]
+    double kinematic_viscosity = 1e-6;                            ///< [m2/s]
     Eigen::Vector3d body_acceleration = Eigen::Vector3d::Zero();  ///< on the fluid only [m/s2]
     Convection convection = Convection::up3;
-    double cfl = 0.5;                                           ///< of sum_i |u_i| dt / cell; at most 0.6 (beyond 0.8 it is unstable)
+    double cfl = 0.5;  ///< of sum_i |u_i| dt / cell; at most 0.6 (beyond 0.8 it is unstable)
     double max_time_step = std::numeric_limits<double>::infinity();  ///< [s]
-    double first_step_factor = 0.1;                             ///< the first step is this part of the stable one...
-    double step_growth = 1.2;                                   ///< ...and grows by at most this from step to step
+    double first_step_factor = 0.1;  ///< the first step is this part of the stable one...
+    double step_growth = 1.2;        ///< ...and grows by at most this from step to step
 };
 
-/// Fields that fines put on the fluid, written by FineCoupling. Face fields belong to the velocity component of their axis.
+/// Fields that fines put on the fluid, written by FineCoupling. Face fields belong to the velocity component of their
+/// axis.
 struct PorousFields {
-    Field void_fraction;                 ///< eps at centres, ghosts filled [-]
-    std::array<Field, 3> solid_flux;     ///< J_s on faces [m/s]
-    std::array<Field, 3> drag_rate;      ///< sum_i w b_i / (rho V) on faces [1/s]
-    std::array<Field, 3> drag_force;     ///< sum_i w F_i / (rho V) on faces, F_i the explicit force on the fines [m/s2]
+    Field void_fraction;              ///< eps at centres, ghosts filled [-]
+    std::array<Field, 3> solid_flux;  ///< J_s on faces [m/s]
+    std::array<Field, 3> drag_rate;   ///< sum_i w b_i / (rho V) on faces [1/s]
+    std::array<Field, 3> drag_force;  ///< sum_i w F_i / (rho V) on faces, F_i the explicit force on the fines [m/s2]
 };
 
 /// Momentum of the fluid and every impulse it received during the last step [N s].
@@ -61,10 +62,11 @@ struct MomentumTally {
     Eigen::Vector3d boundary_pressure = Eigen::Vector3d::Zero();  ///< pressure on the domain's sides
     Eigen::Vector3d body = Eigen::Vector3d::Zero();               ///< body acceleration
     Eigen::Vector3d drag = Eigen::Vector3d::Zero();               ///< drag of the fines on the fluid
-    Eigen::Vector3d fines_pressure = Eigen::Vector3d::Zero();     ///< pressure gradient's impulse on the fines (not on the fluid)
-    Eigen::Vector3d forcing = Eigen::Vector3d::Zero();            ///< forcing by resolved grains and obstacles, on the fluid
-    /// Momentum that the motion of the porosity field would have created or lost; a uniform acceleration takes it out again,
-    /// so it is no term of the balance. Its size tells how coarse the fines' kernel is for the step.
+    Eigen::Vector3d fines_pressure =
+        Eigen::Vector3d::Zero();                        ///< pressure gradient's impulse on the fines (not on the fluid)
+    Eigen::Vector3d forcing = Eigen::Vector3d::Zero();  ///< forcing by resolved grains and obstacles, on the fluid
+    /// Momentum that the motion of the porosity field would have created or lost; a uniform acceleration takes it out
+    /// again, so it is no term of the balance. Its size tells how coarse the fines' kernel is for the step.
     Eigen::Vector3d porosity_defect = Eigen::Vector3d::Zero();
 
     /// |after - before - sum of impulses| over the sum of their magnitudes (0 when nothing acts).
@@ -120,16 +122,19 @@ public:
     /// Provisional velocity between predict() and project(); forcing writes here. Valid on the unknown faces.
     Field& provisional(int axis) { return provisional_[axis]; }
     const Field& provisional(int axis) const { return provisional_[axis]; }
-    /// Sets an initial velocity from a function of position and component; boundary rows are then applied. Not projected.
+    /// Sets an initial velocity from a function of position and component; boundary rows are then applied. Not
+    /// projected.
     template <class Function>
     void set_velocity(const Function& velocity);
     /// Applies boundary rows and ghosts to velocities written through set_velocity, and forgets the step history.
     void restart_history();
     void set_body_acceleration(const Eigen::Vector3d& acceleration) { options_.body_acceleration = acceleration; }
 
-    /// Largest stable step [s]: 1.5 cfl / (12 nu/h2 + 1.5 max sum_i |u_i|/h), capped and grown slowly  [fluid-notes, eq. 14].
+    /// Largest stable step [s]: 1.5 cfl / (12 nu/h2 + 1.5 max sum_i |u_i|/h), capped and grown slowly  [fluid-notes,
+    /// eq. 14].
     double stable_time_step() const;
-    /// Convection, viscosity, old pressure gradient, body acceleration and semi-implicit drag of the fines. \param dt [s]
+    /// Convection, viscosity, old pressure gradient, body acceleration and semi-implicit drag of the fines. \param dt
+    /// [s]
     void predict(double dt);
     /// Pressure increment, new velocity and pressure, boundary rows, tallies. Same dt as predict().
     /// \throws Error  when the velocity is no longer finite
@@ -146,13 +151,15 @@ public:
     const PorousFields& porous_fields() const { return porous_; }
     /// For FineCoupling: allocates the fields on first use.
     PorousFields& porous_fields_for_writing();
-    /// For FineCoupling: takes a new void fraction (centres; ghosts are filled here), gives the old one back in its place, and books the
-    /// momentum that the change moves.
+    /// For FineCoupling: takes a new void fraction (centres; ghosts are filled here), gives the old one back in its
+    /// place, and books the momentum that the change moves.
     void change_void_fraction(Field& void_fraction);
     /// Void fraction on face (i, j, k) = linear index `at` of component `axis`; 1 without fines.
     double face_void_fraction(int axis, std::size_t at) const
     {
-        return has_fines_ ? 0.5 * (porous_.void_fraction[at] + porous_.void_fraction[at - std::size_t(layout_.stride[axis])]) : 1.0;
+        return has_fines_
+                   ? 0.5 * (porous_.void_fraction[at] + porous_.void_fraction[at - std::size_t(layout_.stride[axis])])
+                   : 1.0;
     }
 
     /// For ImmersedBodies: books an impulse that the forcing gave the fluid [N s].
@@ -220,12 +227,13 @@ private:
     MomentumTally momentum_;
     MassTally mass_;
     FlowTimes times_;
-    Eigen::Vector3d fluid_mass_ = Eigen::Vector3d::Zero();      // of the unknown faces, per component [kg]
-    Eigen::Vector3d flux_rate_ = Eigen::Vector3d::Zero();       // boundary fluxes of the last predict [N]
-    Eigen::Vector3d advective_sum_ = Eigen::Vector3d::Zero();   // rho sum u div q of the last predict [N]
-    Eigen::Vector3d advective_rate_ = Eigen::Vector3d::Zero();  // the same as the step combines it with the one before [N]
+    Eigen::Vector3d fluid_mass_ = Eigen::Vector3d::Zero();     // of the unknown faces, per component [kg]
+    Eigen::Vector3d flux_rate_ = Eigen::Vector3d::Zero();      // boundary fluxes of the last predict [N]
+    Eigen::Vector3d advective_sum_ = Eigen::Vector3d::Zero();  // rho sum u div q of the last predict [N]
+    Eigen::Vector3d advective_rate_ =
+        Eigen::Vector3d::Zero();  // the same as the step combines it with the one before [N]
     Eigen::Vector3d pending_defect_ = Eigen::Vector3d::Zero();  // momentum moved by change_void_fraction [N s]
-    double previous_dt_ = 0.0;                                        // 0: no history
+    double previous_dt_ = 0.0;                                  // 0: no history
     double step_limit_ = std::numeric_limits<double>::infinity();
     double max_speed_ = 0.0;  // max sum_i |u_i| [m/s]
 };
@@ -242,7 +250,8 @@ void Flow::set_velocity(const Function& velocity)
                 for (int i = 0; i <= grid_.cells.x(); ++i) {
                     Eigen::Vector3d x(i + 0.5, j + 0.5, k + 0.5);
                     x[axis] -= 0.5;
-                    velocity_[axis][layout_.index(i, j, k)] = velocity(Eigen::Vector3d(grid_.origin + grid_.cell * x), axis);
+                    velocity_[axis][layout_.index(i, j, k)] =
+                        velocity(Eigen::Vector3d(grid_.origin + grid_.cell * x), axis);
                 }
     restart_history();
 }

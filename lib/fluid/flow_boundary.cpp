@@ -11,9 +11,13 @@ namespace {
 
 constexpr int g = Layout::ghost;
 
-int wrap(int i, int n) { return ((i % n) + n) % n; }
+int wrap(int i, int n)
+{
+    return ((i % n) + n) % n;
+}
 
-/// Calls body(offset) for every line along `axis`, ghost lines included; offset is the address of position 0 on the line.
+/// Calls body(offset) for every line along `axis`, ghost lines included; offset is the address of position 0 on the
+/// line.
 template <class Body>
 void for_each_line(const Layout& layout, int axis, const Body& body)
 {
@@ -23,8 +27,9 @@ void for_each_line(const Layout& layout, int axis, const Body& body)
         for (c[a] = -g; c[a] <= layout.cells[a] + g; ++c[a]) body(std::ptrdiff_t(layout.index(c.x(), c.y(), c.z())));
 }
 
-/// The two ghosts beyond an outlet whose last inner value is `inner`. Leaving: zero gradient. Entering: back-flow carries no momentum, so
-/// they make the upwind-biased value at the outlet zero, without shear where the scheme allows (a limited scheme needs a zero neighbour).
+/// The two ghosts beyond an outlet whose last inner value is `inner`. Leaving: zero gradient. Entering: back-flow
+/// carries no momentum, so they make the upwind-biased value at the outlet zero, without shear where the scheme allows
+/// (a limited scheme needs a zero neighbour).
 void set_outlet_ghosts(double inner, bool enters, bool limited, double& first, double& second)
 {
     first = enters && limited ? 0.0 : inner;
@@ -58,8 +63,8 @@ void fill_normal(const GridSpec& grid, const Layout& layout, int axis, bool limi
 }
 
 /// Ghosts of component `component` beyond the sides of another axis, where it sits at cell positions 0..n-1.
-void fill_tangential(const GridSpec& grid, const Layout& layout, int component, int axis, bool limited, const double* normal,
-                     double* u)
+void fill_tangential(const GridSpec& grid, const Layout& layout, int component, int axis, bool limited,
+                     const double* normal, double* u)
 {
     const int n = grid.cells[axis];
     const std::ptrdiff_t s = layout.stride[axis], own = layout.stride[component];
@@ -96,7 +101,8 @@ void Flow::fill_velocity_ghosts()
         fill_normal(grid_, layout_, axis, limited, velocity_[axis].data());
         for (int component = 0; component < 3; ++component)
             if (component != axis)
-                fill_tangential(grid_, layout_, component, axis, limited, velocity_[axis].data(), velocity_[component].data());
+                fill_tangential(grid_, layout_, component, axis, limited, velocity_[axis].data(),
+                                velocity_[component].data());
     }
 }
 

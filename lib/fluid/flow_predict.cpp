@@ -25,8 +25,8 @@ double seconds_since(std::chrono::steady_clock::time_point start)
 }  // namespace
 
 template <bool porous>
-static ComponentView view_of(int axis, const Layout& layout, const std::array<Field, 3>& velocity, const std::array<Field, 3>& flux,
-                             const Field& eps, double viscous)
+static ComponentView view_of(int axis, const Layout& layout, const std::array<Field, 3>& velocity,
+                             const std::array<Field, 3>& flux, const Field& eps, double viscous)
 {
     ComponentView view;
     view.u = velocity[axis].data();
@@ -40,14 +40,14 @@ static ComponentView view_of(int axis, const Layout& layout, const std::array<Fi
     return view;
 }
 
-/// One component: rate = -div(flux) (+ u div q with fines), u* = u + dt (now rate - before old rate)/eps - dt grad p + dt f.
-/// Each flux is computed once: rows keep those of the low y side, planes those of the low z side.
+/// One component: rate = -div(flux) (+ u div q with fines), u* = u + dt (now rate - before old rate)/eps - dt grad p +
+/// dt f. Each flux is computed once: rows keep those of the low y side, planes those of the low z side.
 template <bool porous, Convection convection>
 void Flow::sweep_component(int axis, double dt, double now, double before)
 {
     const double h = grid_.cell;
-    const ComponentView view =
-        view_of<porous>(axis, layout_, velocity_, volume_flux_, porous_.void_fraction, options_.kinematic_viscosity / h);
+    const ComponentView view = view_of<porous>(axis, layout_, velocity_, volume_flux_, porous_.void_fraction,
+                                               options_.kinematic_viscosity / h);
     const FaceRange range(grid_, axis);
     const std::ptrdiff_t sy = layout_.stride[1], sz = layout_.stride[2], own = layout_.stride[axis];
     const std::ptrdiff_t n = range.row_length();
@@ -61,8 +61,9 @@ void Flow::sweep_component(int axis, double dt, double now, double before)
     constexpr bool advective = porous && convection != Convection::none;
     const std::size_t block_size = scratch_block();
     advective_sum_[axis] = parallel_sum(range.planes(), planes_per_block, 0.0, [&](std::size_t begin, std::size_t end) {
-        double* __restrict gz = scratch_.data() + begin / planes_per_block * block_size;  // momentum fluxes through low sides
-        double* __restrict qz = gz + sz;                                                  // volume fluxes, only with fines
+        double* __restrict gz =
+            scratch_.data() + begin / planes_per_block * block_size;  // momentum fluxes through low sides
+        double* __restrict qz = gz + sz;                              // volume fluxes, only with fines
         double* __restrict gy = qz + sz;
         double* __restrict qy = gy + sy;
         double* __restrict gx = qy + sy;
@@ -70,7 +71,8 @@ void Flow::sweep_component(int axis, double dt, double now, double before)
         double* __restrict transported = qx + sy;
         double sum = 0.0;
         const int k_begin = range.low.z() + int(begin), k_end = range.low.z() + int(end);
-        const auto start_row = [&](int direction, std::ptrdiff_t f0, std::ptrdiff_t count, double* __restrict g, double* __restrict q) {
+        const auto start_row = [&](int direction, std::ptrdiff_t f0, std::ptrdiff_t count, double* __restrict g,
+                                   double* __restrict q) {
             for (std::ptrdiff_t i = 0; i < count; ++i) g[i] = low_flux<porous, convection>(view, direction, f0 + i);
             if constexpr (advective)
                 for (std::ptrdiff_t i = 0; i < count; ++i) q[i] = low_volume_flux(view, direction, f0 + i);
@@ -106,7 +108,8 @@ void Flow::sweep_component(int axis, double dt, double now, double before)
                 }
                 if constexpr (advective)
                     sum += detail::weighted_row(
-                        grid_, axis, range, j, k, [](std::ptrdiff_t m, const auto& v) { return detail::lane_sum(m, v); },
+                        grid_, axis, range, j, k,
+                        [](std::ptrdiff_t m, const auto& v) { return detail::lane_sum(m, v); },
                         [&](std::ptrdiff_t i) { return transported[i]; });
             }
         }
@@ -139,7 +142,8 @@ void Flow::build_volume_flux()
             const std::ptrdiff_t first = std::max(std::ptrdiff_t(begin) * layout_.stride[2], s);
             const double* u = velocity_[axis].data();
             double* q = volume_flux_[axis].data();
-            for (std::ptrdiff_t f = first; f < std::ptrdiff_t(end) * layout_.stride[2]; ++f) q[f] = 0.5 * (eps[f] + eps[f - s]) * u[f];
+            for (std::ptrdiff_t f = first; f < std::ptrdiff_t(end) * layout_.stride[2]; ++f)
+                q[f] = 0.5 * (eps[f] + eps[f - s]) * u[f];
         }
     });
 }
@@ -165,7 +169,8 @@ Eigen::Vector3d Flow::boundary_flux_rate() const
                     for (c[a] = range.low[a]; c[a] < range.high[a]; ++c[a]) {
                         const auto f = std::ptrdiff_t(layout_.index(c.x(), c.y(), c.z()));
                         double flux = low_flux<porous, convection>(view, d, f);
-                        // half of the control volume of an outlet face is outside: the flux at the face is the mean of both sides
+                        // half of the control volume of an outlet face is outside: the flux at the face is the mean of
+                        // both sides
                         if (d == axis && grid_.outlet(d, side))
                             flux = 0.5 * (flux + low_flux<porous, convection>(view, d, side == 0 ? f + s : f - s));
                         const double weight = axis == d ? 1.0 : detail::face_weight(grid_, axis, c[axis]);
@@ -182,10 +187,13 @@ Eigen::Vector3d Flow::boundary_flux_rate() const
 {
     switch (options_.convection) {
         case Convection::none:
-            return has_fines_ ? boundary_flux_rate<true, Convection::none>() : boundary_flux_rate<false, Convection::none>();
+            return has_fines_ ? boundary_flux_rate<true, Convection::none>()
+                              : boundary_flux_rate<false, Convection::none>();
         case Convection::koren:
-            return has_fines_ ? boundary_flux_rate<true, Convection::koren>() : boundary_flux_rate<false, Convection::koren>();
-        case Convection::up3: break;
+            return has_fines_ ? boundary_flux_rate<true, Convection::koren>()
+                              : boundary_flux_rate<false, Convection::koren>();
+        case Convection::up3:
+            break;
     }
     return has_fines_ ? boundary_flux_rate<true, Convection::up3>() : boundary_flux_rate<false, Convection::up3>();
 }
@@ -208,32 +216,34 @@ void Flow::apply_fines(double dt)
         const double* u = velocity_[axis].data();
         double* __restrict us = provisional_[axis].data();
         using Pair = Eigen::Vector2d;  // drag on the fluid, pressure gradient on the fines
-        const Pair sums = parallel_sum(range.planes(), planes_per_block, Pair(0.0, 0.0), [&](std::size_t begin, std::size_t end) {
-            Pair sum(0.0, 0.0);
-            for (int k = range.low.z() + int(begin); k < range.low.z() + int(end); ++k)
-                for (int j = range.low.y(); j < range.high.y(); ++j) {
-                    const auto f0 = std::ptrdiff_t(layout_.index(range.low.x(), j, k));
-                    const auto lanes = [](std::ptrdiff_t m, const auto& v) { return detail::lane_sum(m, v); };
-                    // value() is called twice at outlet ends: it must not change us, so the update comes afterwards
-                    const auto drag = [&](std::ptrdiff_t i) {
-                        const std::ptrdiff_t f = f0 + i;
-                        const double face_eps = 0.5 * (eps[f] + eps[f - own]);
-                        const double start = us[f] + repair;
-                        return face_eps * ((face_eps * start + dt * (A[f] * u[f] - B[f])) / (face_eps + dt * A[f]) - start);
-                    };
-                    const auto fines = [&](std::ptrdiff_t i) {
-                        const std::ptrdiff_t f = f0 + i;
-                        return (0.5 * (eps[f] + eps[f - own]) - 1.0) * (p[f] - p[f - own]);
-                    };
-                    sum[0] += detail::weighted_row(grid_, axis, range, j, k, lanes, drag);
-                    sum[1] += detail::weighted_row(grid_, axis, range, j, k, lanes, fines);
-                    for (std::ptrdiff_t f = f0; f < f0 + range.row_length(); ++f) {
-                        const double face_eps = 0.5 * (eps[f] + eps[f - own]);
-                        us[f] = (face_eps * (us[f] + repair) + dt * (A[f] * u[f] - B[f])) / (face_eps + dt * A[f]);
+        const Pair sums =
+            parallel_sum(range.planes(), planes_per_block, Pair(0.0, 0.0), [&](std::size_t begin, std::size_t end) {
+                Pair sum(0.0, 0.0);
+                for (int k = range.low.z() + int(begin); k < range.low.z() + int(end); ++k)
+                    for (int j = range.low.y(); j < range.high.y(); ++j) {
+                        const auto f0 = std::ptrdiff_t(layout_.index(range.low.x(), j, k));
+                        const auto lanes = [](std::ptrdiff_t m, const auto& v) { return detail::lane_sum(m, v); };
+                        // value() is called twice at outlet ends: it must not change us, so the update comes afterwards
+                        const auto drag = [&](std::ptrdiff_t i) {
+                            const std::ptrdiff_t f = f0 + i;
+                            const double face_eps = 0.5 * (eps[f] + eps[f - own]);
+                            const double start = us[f] + repair;
+                            return face_eps *
+                                   ((face_eps * start + dt * (A[f] * u[f] - B[f])) / (face_eps + dt * A[f]) - start);
+                        };
+                        const auto fines = [&](std::ptrdiff_t i) {
+                            const std::ptrdiff_t f = f0 + i;
+                            return (0.5 * (eps[f] + eps[f - own]) - 1.0) * (p[f] - p[f - own]);
+                        };
+                        sum[0] += detail::weighted_row(grid_, axis, range, j, k, lanes, drag);
+                        sum[1] += detail::weighted_row(grid_, axis, range, j, k, lanes, fines);
+                        for (std::ptrdiff_t f = f0; f < f0 + range.row_length(); ++f) {
+                            const double face_eps = 0.5 * (eps[f] + eps[f - own]);
+                            us[f] = (face_eps * (us[f] + repair) + dt * (A[f] * u[f] - B[f])) / (face_eps + dt * A[f]);
+                        }
                     }
-                }
-            return sum;
-        });
+                return sum;
+            });
         momentum_.drag[axis] = volume * sums[0];
         momentum_.fines_pressure[axis] = volume / grid_.cell * dt * sums[1];
     }
@@ -245,7 +255,8 @@ void Flow::predict(double dt)
     const Eigen::Vector3d last = momentum_.after;
     momentum_ = MomentumTally{};
     momentum_.before = last;
-    // Adams-Bashforth 2 for a changing step; the ratio is limited because a far extrapolation of a noisy rate is not stable
+    // Adams-Bashforth 2 for a changing step; the ratio is limited because a far extrapolation of a noisy rate is not
+    // stable
     const double ratio = previous_dt_ > 0.0 ? std::min(dt / previous_dt_, 1.5) : 0.0;
     const double now = 1.0 + 0.5 * ratio, before = 0.5 * ratio;
     if (has_fines_) build_volume_flux();
@@ -254,9 +265,15 @@ void Flow::predict(double dt)
     flux_rate_ = rate;
     const Eigen::Vector3d advective_before = advective_sum_;
     switch (options_.convection) {
-        case Convection::none: sweep_all<Convection::none>(dt, now, before); break;
-        case Convection::up3: sweep_all<Convection::up3>(dt, now, before); break;
-        case Convection::koren: sweep_all<Convection::koren>(dt, now, before); break;
+        case Convection::none:
+            sweep_all<Convection::none>(dt, now, before);
+            break;
+        case Convection::up3:
+            sweep_all<Convection::up3>(dt, now, before);
+            break;
+        case Convection::koren:
+            sweep_all<Convection::koren>(dt, now, before);
+            break;
     }
     advective_rate_ = now * advective_sum_ - before * advective_before;
     momentum_.body = dt * fluid_mass_.cwiseProduct(options_.body_acceleration);

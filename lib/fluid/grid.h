@@ -1,8 +1,8 @@
 #pragma once
 /// \file fluid/grid.h
 /// Uniform staggered (MAC) grid: what a flow domain is, and how its fields lie in memory.
-/// Velocity components live on the faces of cubic cells (u[i] at x = origin + i h, v and w alike), pressure and porosity at
-/// the centres. All fields share one padded layout, x fastest, with two ghost layers on each side.
+/// Velocity components live on the faces of cubic cells (u[i] at x = origin + i h, v and w alike), pressure and
+/// porosity at the centres. All fields share one padded layout, x fastest, with two ghost layers on each side.
 #include <Eigen/Core>
 #include <array>
 #include <cstddef>
@@ -30,10 +30,10 @@ enum Face { x_minus, x_plus, y_minus, y_plus, z_minus, z_plus };
 
 /// Domain, resolution and boundaries of a flow.
 struct GridSpec {
-    Eigen::Vector3i cells = Eigen::Vector3i::Zero();    ///< number of cells along x, y, z
-    double cell = 0.0;                                  ///< edge of the cubic cells [m]
-    Eigen::Vector3d origin = Eigen::Vector3d::Zero();   ///< low corner of the domain [m]
-    std::array<Boundary, 6> boundary{};                 ///< indexed by Face
+    Eigen::Vector3i cells = Eigen::Vector3i::Zero();   ///< number of cells along x, y, z
+    double cell = 0.0;                                 ///< edge of the cubic cells [m]
+    Eigen::Vector3d origin = Eigen::Vector3d::Zero();  ///< low corner of the domain [m]
+    std::array<Boundary, 6> boundary{};                ///< indexed by Face
 
     bool periodic(int axis) const { return boundary[2 * axis].kind == BoundaryKind::periodic; }
     bool outlet(int axis, int side) const { return boundary[2 * axis + side].kind == BoundaryKind::outlet; }
@@ -57,8 +57,8 @@ struct CacheAligned {
     CacheAligned(const CacheAligned<U>&)
     {
     }
-    T* allocate(std::size_t n) { return static_cast<T*>(::operator new(n * sizeof(T), std::align_val_t{64})); }
-    void deallocate(T* p, std::size_t) { ::operator delete(p, std::align_val_t{64}); }
+    T* allocate(std::size_t n) { return static_cast<T*>(::operator new (n * sizeof(T), std::align_val_t{64})); }
+    void deallocate(T* p, std::size_t) { ::operator delete (p, std::align_val_t{64}); }
     template <class U>
     bool operator==(const CacheAligned<U>&) const
     {

@@ -19,10 +19,10 @@ using Eigen::Vector3d;
 struct ImmersedBodies::Body {
     BodyShape shape;
     RigidMotion placed;
-    bool found = false;                  ///< faces belong to `placed`
-    std::array<SolidSet, 4> solid;       ///< components and cells
+    bool found = false;                             ///< faces belong to `placed`
+    std::array<SolidSet, 4> solid;                  ///< components and cells
     std::array<std::vector<SolidRun>, 3> own_runs;  ///< runs without the faces shared with other bodies
-    Vector3d run_mass = Vector3d::Zero();                  ///< of the own runs, in faces; about `placed` like the inertia
+    Vector3d run_mass = Vector3d::Zero();           ///< of the own runs, in faces; about `placed` like the inertia
     Eigen::Matrix3d run_inertia = Eigen::Matrix3d::Zero();  ///< [m2]
 };
 
@@ -37,40 +37,6 @@ struct ImmersedBodies::Shared {
     double fraction = 0.0, weight = 0.0;
     std::vector<Share> shares;
 };
-
-BodyShape sphere_shape(double diameter)
-{
-    const double radius = 0.5 * diameter;
-    BodyShape shape;
-    shape.box_min.setConstant(-radius);
-    shape.box_max.setConstant(radius);
-    shape.distance = [radius](std::span<const Vector3d> points, std::span<double> distances) {
-        for (std::size_t p = 0; p < points.size(); ++p) distances[p] = points[p].norm() - radius;
-    };
-    return shape;
-}
-
-BodyShape plate_shape(double thickness, double hole, double pitch, const Eigen::Vector2d& half_size, bool holes_off_centre)
-{
-    if (!(thickness > 0.0)) throw UsageError("wall.thickness", "is not positive", "give the plate's thickness, such as \"2mm\"");
-    if (!(hole > 0.0 && hole < pitch))
-        throw UsageError("wall.hole", "does not leave a web between holes", "choose hole smaller than pitch, both positive");
-    BodyShape shape;
-    shape.box_max = Vector3d(half_size.x(), half_size.y(), 0.5 * thickness);
-    shape.box_min = -shape.box_max;
-    const double shift = holes_off_centre ? 0.5 * pitch : 0.0;
-    shape.distance = [=](std::span<const Vector3d> points, std::span<double> distances) {
-        const auto inside_hole = [&](double x) {  // depth inside the nearest hole along one axis, negative in the web
-            const double y = x - shift;
-            return 0.5 * hole - std::abs(y - pitch * std::round(y / pitch));
-        };
-        for (std::size_t p = 0; p < points.size(); ++p) {
-            const double in_plate = std::abs(points[p].z()) - 0.5 * thickness;
-            distances[p] = std::max(in_plate, std::min(inside_hole(points[p].x()), inside_hole(points[p].y())));
-        }
-    };
-    return shape;
-}
 
 ImmersedBodies::ImmersedBodies(const GridSpec& grid, const ForcingOptions& options)
     : grid_(grid), layout_(grid.cells), options_(options)
@@ -129,7 +95,8 @@ std::vector<RigidMotion> ImmersedBodies::placed_motions() const
 void ImmersedBodies::restore(std::span<const RigidMotion> placed_motions)
 {
     if (placed_motions.size() != bodies_.size())
-        throw Error("immersed bodies", "the checkpoint holds another number of bodies", "resume with the case that wrote it");
+        throw Error("immersed bodies", "the checkpoint holds another number of bodies",
+                    "resume with the case that wrote it");
     for (std::size_t b = 0; b < bodies_.size(); ++b) {
         bodies_[b]->placed = placed_motions[b];
         bodies_[b]->found = false;
@@ -188,13 +155,15 @@ void ImmersedBodies::merge()
     shared_.clear();
     for (int component = 0; component < 3; ++component) {
         std::vector<Claim>& list = claims[component];
-        std::sort(list.begin(), list.end(), [](const Claim& a, const Claim& b) { return std::pair(a.at, a.body) < std::pair(b.at, b.body); });
+        std::sort(list.begin(), list.end(),
+                  [](const Claim& a, const Claim& b) { return std::pair(a.at, a.body) < std::pair(b.at, b.body); });
         for (std::size_t first = 0, last = 0; first < list.size(); first = last) {
             Shared shared;
             shared.at = list[first].at;
             shared.component = component;
             double total = 0.0;
-            for (last = first; last < list.size() && list[last].at == list[first].at; ++last) total += double(list[last].face.fraction);
+            for (last = first; last < list.size() && list[last].at == list[first].at; ++last)
+                total += double(list[last].face.fraction);
             for (std::size_t c = first; c < last; ++c) {
                 const CutFace& face = list[c].face;
                 shared.shares.push_back({list[c].body, double(face.fraction) / total, face.i, face.j, face.k});
@@ -320,7 +289,8 @@ void weigh_runs(const std::vector<SolidRun>& runs, const Carrier& carrier, Vecto
     for (const SolidRun& run : runs) {
         const double n = run.length;
         mass[c] += n;
-        add_moments<c>(moments, carrier.arm(c, run.i, run.j, run.k) + Vector3d(0.5 * (n - 1.0) * carrier.cell, 0.0, 0.0), n);
+        add_moments<c>(moments,
+                       carrier.arm(c, run.i, run.j, run.k) + Vector3d(0.5 * (n - 1.0) * carrier.cell, 0.0, 0.0), n);
         spreads += n * (n * n - 1.0) / 12.0 * carrier.cell * carrier.cell;  // about the row's own middle
     }
     add_inertia<c>(inertia, moments);
@@ -348,7 +318,9 @@ void measure_runs(const Flow& flow, const std::vector<SolidRun>& runs, const Car
             return plain;
         };
         const double f = detail::lane_sum(run.length, slip);
-        const double fx = c == 0 ? 0.0 : carrier.cell * detail::lane_sum(run.length, [&](std::ptrdiff_t l) { return double(l) * slip(l); });
+        const double fx =
+            c == 0 ? 0.0
+                   : carrier.cell * detail::lane_sum(run.length, [&](std::ptrdiff_t l) { return double(l) * slip(l); });
         force += f;
         add_torque<c>(torque, r, f, fx);
     }
@@ -358,8 +330,8 @@ void measure_runs(const Flow& flow, const std::vector<SolidRun>& runs, const Car
 
 /// The same for cut faces, whose weights are found here.
 template <int c, bool porous>
-void measure_cuts(const Flow& flow, const ForcingOptions& options, double dt, std::vector<CutFace>& cuts, const Carrier& carrier,
-                  FluidAction& action)
+void measure_cuts(const Flow& flow, const ForcingOptions& options, double dt, std::vector<CutFace>& cuts,
+                  const Carrier& carrier, FluidAction& action)
 {
     const double* us = flow.provisional(c).data();
     const double* eps = porous ? flow.porous_fields().void_fraction.data() : nullptr;
@@ -388,7 +360,8 @@ void measure_cuts(const Flow& flow, const ForcingOptions& options, double dt, st
 
 /// u* <- u* + w (u_s - u*) on the faces of one component. \returns the sum of eps times the change
 template <int c, bool porous>
-double force_faces(Flow& flow, const std::vector<SolidRun>& runs, const std::vector<CutFace>& cuts, const Carrier& carrier)
+double force_faces(Flow& flow, const std::vector<SolidRun>& runs, const std::vector<CutFace>& cuts,
+                   const Carrier& carrier)
 {
     double* us = flow.provisional(c).data();
     const double* eps = porous ? flow.porous_fields().void_fraction.data() : nullptr;
@@ -425,7 +398,9 @@ void ImmersedBodies::weigh()
         const Carrier carrier(grid_, body.placed, body.placed);
         body.run_mass.setZero();
         body.run_inertia.setZero();
-        for_each_component([&](auto component) { weigh_runs<component>(body.own_runs[component], carrier, body.run_mass, body.run_inertia); });
+        for_each_component([&](auto component) {
+            weigh_runs<component>(body.own_runs[component], carrier, body.run_mass, body.run_inertia);
+        });
     });
 }
 
@@ -435,7 +410,8 @@ double ImmersedBodies::shared_velocity(const Shared& shared, std::span<const Rig
     double solid = 0.0;
     for (const Shared::Share& share : shared.shares) {
         const Carrier carrier(grid_, bodies_[share.body]->placed, motions[share.body]);
-        solid += share.part * carrier.component_velocity(shared.component, carrier.arm(shared.component, share.i, share.j, share.k));
+        solid += share.part *
+                 carrier.component_velocity(shared.component, carrier.arm(shared.component, share.i, share.j, share.k));
     }
     return solid;
 }
@@ -466,7 +442,8 @@ std::span<const FluidAction> ImmersedBodies::measure(Flow& flow, double dt, std:
             constexpr int c = component;
             if (shared.component != c) return;
             const double slip = flow.provisional(c)[shared.at] - shared_velocity(shared, motions);
-            shared.weight = forcing_weight(options_, shared.fraction, slip, dt, flow.options().kinematic_viscosity, grid_.cell);
+            shared.weight =
+                forcing_weight(options_, shared.fraction, slip, dt, flow.options().kinematic_viscosity, grid_.cell);
             for (const Shared::Share& share : shared.shares) {
                 const Carrier carrier(grid_, bodies_[share.body]->placed, motions[share.body]);
                 const Vector3d r = carrier.arm(c, share.i, share.j, share.k);

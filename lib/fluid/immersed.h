@@ -1,7 +1,7 @@
 #pragma once
 /// \file fluid/immersed.h
-/// Resolved grains and obstacles in the flow: solid fraction of faces from a signed distance, implicit Brinkman forcing,
-/// hydrodynamic force and torque as the discrete reaction. Distances are negative in solid.
+/// Resolved grains and obstacles in the flow: solid fraction of faces from a signed distance, implicit Brinkman
+/// forcing, hydrodynamic force and torque as the discrete reaction. Distances are negative in solid.
 #include <Eigen/Geometry>
 #include <functional>
 #include <span>
@@ -11,7 +11,8 @@
 
 namespace coral::fluid {
 
-/// Signed distance [m] of each point [m], in the frame of the body; distances.size() == points.size(). Called from several threads.
+/// Signed distance [m] of each point [m], in the frame of the body; distances.size() == points.size(). Called from
+/// several threads.
 using DistanceFunction = std::function<void(std::span<const Eigen::Vector3d> points, std::span<double> distances)>;
 
 /// Shape of a body in its own frame. The box holds the solid; outside it nothing is sampled.
@@ -23,12 +24,14 @@ struct BodyShape {
 
 /// Sphere about the origin of its frame.
 BodyShape sphere_shape(double diameter);
-/// Plate lying in the x-y plane of its frame, |z| <= thickness/2, |x|, |y| <= half_size, with square holes of edge `hole` in a
-/// square lattice of spacing `pitch`; a hole is centred on the frame's origin unless `holes_off_centre`, then the origin lies amid four holes.
-/// \throws UsageError  hole not smaller than pitch
-BodyShape plate_shape(double thickness, double hole, double pitch, const Eigen::Vector2d& half_size, bool holes_off_centre = false);
+/// Plate lying in the x-y plane of its frame, |z| <= thickness/2, |x|, |y| <= half_size, with square holes of edge
+/// `hole` in a square lattice of spacing `pitch`; a hole is centred on the frame's origin unless `holes_off_centre`,
+/// then the origin lies amid four holes. \throws UsageError  hole not smaller than pitch
+BodyShape plate_shape(double thickness, double hole, double pitch, const Eigen::Vector2d& half_size,
+                      bool holes_off_centre = false);
 
-/// Pose and velocity of a rigid body; position is the centre of mass = origin of the shape's frame. [m], [m/s], [rad/s] world frame
+/// Pose and velocity of a rigid body; position is the centre of mass = origin of the shape's frame. [m], [m/s], [rad/s]
+/// world frame
 struct RigidMotion {
     Eigen::Vector3d position = Eigen::Vector3d::Zero();
     Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();
@@ -40,17 +43,19 @@ struct RigidMotion {
 /// The caller advances U by   (m_p + M_w - m_f) dU = dt (force + contacts + (m_p - m_f) g)   [fluid-notes, eq. 11]
 /// and omega with I_p + I_w - I_f alike (plus virtual mass when the grain is lighter than 0.8 of the fluid).
 struct FluidAction {
-    Eigen::Vector3d force = Eigen::Vector3d::Zero();          ///< [N]
-    Eigen::Vector3d torque = Eigen::Vector3d::Zero();         ///< about the centre of mass [N m]
-    Eigen::Vector3d forced_mass = Eigen::Vector3d::Zero();    ///< M_w = rho sum w V, per velocity component [kg]
+    Eigen::Vector3d force = Eigen::Vector3d::Zero();           ///< [N]
+    Eigen::Vector3d torque = Eigen::Vector3d::Zero();          ///< about the centre of mass [N m]
+    Eigen::Vector3d forced_mass = Eigen::Vector3d::Zero();     ///< M_w = rho sum w V, per velocity component [kg]
     Eigen::Matrix3d forced_inertia = Eigen::Matrix3d::Zero();  ///< I_w, about the centre of mass [kg m2]
 };
 
 struct ForcingOptions {
-    double viscous_rate = 20.0;    ///< C1 of eq. 8
-    double inertial_rate = 0.5;    ///< C2 of eq. 8
-    bool plain_blend = false;      ///< the paper's u = (1-phi) u + phi u_s: its drag depends on the time step; for comparison only
-    double reshape_distance = 0.0; ///< a body keeps its faces until a point of it has moved this many cells; 0.05 saves time
+    double viscous_rate = 20.0;  ///< C1 of eq. 8
+    double inertial_rate = 0.5;  ///< C2 of eq. 8
+    bool plain_blend =
+        false;  ///< the paper's u = (1-phi) u + phi u_s: its drag depends on the time step; for comparison only
+    double reshape_distance =
+        0.0;  ///< a body keeps its faces until a point of it has moved this many cells; 0.05 saves time
 };
 
 class ImmersedBodies {
@@ -68,12 +73,14 @@ public:
     /// \param motions  one per body, in the order of add(). Bodies wrap across periodic sides.
     void place(std::span<const RigidMotion> motions);
 
-    /// Force and torque from the provisional velocity, with the motions at the start of the step  [fluid-notes, eq. 10, 12]:
+    /// Force and torque from the provisional velocity, with the motions at the start of the step  [fluid-notes, eq. 10,
+    /// 12]:
     ///     F = (rho/dt) sum_faces w eps (u* - u_s) h3
     /// Weights w [eq. 8] are kept for apply(). \returns one action per body, valid until the next call
     std::span<const FluidAction> measure(Flow& flow, double dt, std::span<const RigidMotion> motions);
 
-    /// u* <- u* + w (u_s - u*) with the motions at the end of the contact steps [eq. 7]; books the impulse in the flow's tally.
+    /// u* <- u* + w (u_s - u*) with the motions at the end of the contact steps [eq. 7]; books the impulse in the
+    /// flow's tally.
     void apply(Flow& flow, std::span<const RigidMotion> motions);
     /// What apply() gave the fluid on behalf of each body [N s]: their sum is the impulse booked in the flow's tally.
     std::span<const Eigen::Vector3d> impulses() const { return impulses_; }

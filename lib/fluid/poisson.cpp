@@ -120,8 +120,8 @@ Poisson::Impl::Impl(const GridSpec& g) : grid(g)
     backward.plan = fftw_plan_r2r_2d(n0, n1, sample.data(), sample.data(), b.backward, a.backward, FFTW_ESTIMATE);
     if (!periodic_t) return;
     const auto along_t = [&](fftw_r2r_kind kind) {
-        return fftw_plan_many_r2r(1, &n2, n1, sample.data(), nullptr, int(plane_ab), 1, sample.data(), nullptr, int(plane_ab), 1,
-                                  &kind, FFTW_ESTIMATE | FFTW_UNALIGNED);
+        return fftw_plan_many_r2r(1, &n2, n1, sample.data(), nullptr, int(plane_ab), 1, sample.data(), nullptr,
+                                  int(plane_ab), 1, &kind, FFTW_ESTIMATE | FFTW_UNALIGNED);
     };
     forward_t.plan = along_t(t.forward);
     backward_t.plan = along_t(t.backward);
@@ -191,7 +191,8 @@ void Poisson::Impl::tridiagonal_row(double* f, std::size_t row_b, std::vector<do
             }
         }
     }
-    if (singular && row_b == 0) f[(nt - 1) * plane_ab] = 0.0;  // the constant mode: its last pivot is zero; pin its last value
+    if (singular && row_b == 0)
+        f[(nt - 1) * plane_ab] = 0.0;  // the constant mode: its last pivot is zero; pin its last value
     for (std::size_t p = nt - 1; p-- > 0;) {
         double* row = f + p * plane_ab;
         const double* after = row + plane_ab;
@@ -240,9 +241,18 @@ void Poisson::Impl::transpose(const Field& from, Field& to, bool forth) const
 
 Poisson::Poisson(const GridSpec& grid) : impl_(std::make_unique<Impl>(grid)) {}
 Poisson::~Poisson() = default;
-std::size_t Poisson::row() const { return impl_->nx; }
-std::size_t Poisson::plane() const { return impl_->plane_xy; }
-Field Poisson::make_work() const { return Field(impl_->plane_xy * impl_->nz, 0.0); }
+std::size_t Poisson::row() const
+{
+    return impl_->nx;
+}
+std::size_t Poisson::plane() const
+{
+    return impl_->plane_xy;
+}
+Field Poisson::make_work() const
+{
+    return Field(impl_->plane_xy * impl_->nz, 0.0);
+}
 
 void Poisson::solve(Field& work, Field& scratch) const
 {

@@ -1,7 +1,7 @@
 #pragma once
 /// \file fluid/poisson.h
-/// Direct solution of the seven-point Poisson equation of a GridSpec: fast transforms along two axes, a tridiagonal solve
-/// along the third (an axis with an outlet if there is one). Periodic in all three: transforms along all three.
+/// Direct solution of the seven-point Poisson equation of a GridSpec: fast transforms along two axes, a tridiagonal
+/// solve along the third (an axis with an outlet if there is one). Periodic in all three: transforms along all three.
 #include <memory>
 
 #include "fluid/grid.h"
@@ -20,8 +20,9 @@ public:
     std::size_t plane() const;
     Field make_work() const;
 
-    /// In: b [1/s2 for a pressure]; out: x. Safe to call from several threads with different arrays; the result does not depend on the
-    /// number of threads. \param scratch  second array, resized as needed (only used when the tridiagonal axis is not z)
+    /// In: b [1/s2 for a pressure]; out: x. Safe to call from several threads with different arrays; the result does
+    /// not depend on the number of threads. \param scratch  second array, resized as needed (only used when the
+    /// tridiagonal axis is not z)
     void solve(Field& work, Field& scratch) const;
 
 private:

@@ -1,3 +1,4 @@
+// Fields of the fines: scatter to the flow, gather from it.
 #include "fluid/porous.h"
 
 #include <algorithm>
@@ -5,6 +6,7 @@
 #include <cmath>
 
 #include "core/parallel.h"
+#include "fluid/detail/fines.h"
 
 namespace coral::fluid {
 
@@ -14,17 +16,9 @@ using Eigen::Vector4d;
 
 namespace {
 
-constexpr std::size_t particles_per_chunk = 64;
-constexpr std::size_t planes_per_slab = 8;
-
-int wrap(int i, int n) { return ((i % n) + n) % n; }
-
-/// Cell that a position beyond the walls at 0 and n mirrors to.
-int fold(int i, int n)
-{
-    const int m = wrap(i, 2 * n);
-    return m < n ? m : 2 * n - 1 - m;
-}
+using detail::particles_per_chunk;
+using detail::planes_per_slab;
+using detail::wrap;
 
 class Stopwatch {
 public:
@@ -36,221 +30,23 @@ private:
     std::chrono::steady_clock::time_point start_;
 };
 
-/// peskin_kernel as a function of r squared, linear between 4096 entries: error below 1e-7, a third of the cost of its roots.
-class KernelTable {
-public:
-    KernelTable()
-    {
-        for (int i = 0; i <= entries + 1; ++i) values_[std::size_t(i)] = peskin_kernel(std::sqrt(4.0 * i / entries));
-    }
-    double operator()(double r_squared) const
-    {
-        const double position = std::min(r_squared * (entries / 4.0), double(entries));
-        const int i = int(position);
-        return values_[std::size_t(i)] + (position - i) * (values_[std::size_t(i) + 1] - values_[std::size_t(i)]);
-    }
-
-private:
-    static constexpr int entries = 4096;
-    std::array<double, entries + 2> values_{};
-};
-const KernelTable kernel_table;
-
-Vector4d quad(const Field& quads, std::size_t at) { return Eigen::Map<const Vector4d>(quads.data() + 4 * at); }
+Vector4d quad(const Field& quads, std::size_t at)
+{
+    return Eigen::Map<const Vector4d>(quads.data() + 4 * at);
+}
 
 }  // namespace
 
-double peskin_kernel(double r)
-{
-    const double inner = 0.125 * (3.0 - 2.0 * r + std::sqrt(std::max(1.0 + 4.0 * r - 4.0 * r * r, 0.0)));
-    const double outer = 0.125 * (5.0 - 2.0 * r - std::sqrt(std::max(-7.0 + 12.0 * r - 4.0 * r * r, 0.0)));
-    return r <= 1.0 ? inner : (r <= 2.0 ? outer : 0.0);
-}
-
-FineCoupling::FineCoupling(const GridSpec& grid, const KernelOptions& options) : grid_(grid), layout_(grid.cells), options_(options)
-{
-    cells_.cells = grid.cells;
-    cells_.cell = grid.cell;
-    for (int d = 0; d < 3; ++d) cells_.stride[d] = layout_.stride[d];
-    cells_.offset = std::ptrdiff_t(layout_.index(0, 0, 0));
-    cells_.total = layout_.total;
-    for (int d = 0; d < 3; ++d) {
-        const int n = grid.cells[d];
-        // half to each face; all to the other one where a face has a given velocity and could not answer
-        for (int i = 0; i < n; ++i) {
-            const bool low = i >= grid.first_unknown(d), high = i + 1 < grid.last_unknown(d) || grid.periodic(d);
-            low_share_[d].push_back(low ? (high ? 0.5 : 1.0) : 0.0);
-            high_share_[d].push_back(high ? (low ? 0.5 : 1.0) : 0.0);
-        }
-    }
-    void_fraction_ = layout_.make_field(1.0);
-    open_cells_ = layout_.make_field(1.0);
-}
-
-std::size_t FineCoupling::stored_weights() const
-{
-    std::size_t sum = 0;
-    for (const auto* chunks : {&volume_, &felt_})
-        for (const Weights& w : *chunks) sum += w.values.size();
-    return sum;
-}
-
-/// Largest block that divides the grid and leaves 1.5 blocks per smallest diameter: the felt averages do not change [fluid-notes, section 7].
-void FineCoupling::choose_blocks(std::span<const double> diameters)
-{
-    block_ = std::max(options_.coupling_cells, 1);
-    if (options_.coupling_cells <= 0) {
-        double smallest = 4.0 * 1.5 * grid_.cell;  // no more than 4 cells
-        for (const double d : diameters) smallest = std::min(smallest, d);
-        block_ = std::max(1, int(smallest / (1.5 * grid_.cell) + 1e-9));
-    }
-    while (block_ > 1 && ((grid_.cells.array() / block_) * block_ != grid_.cells.array()).any()) --block_;
-    blocks_.cells = grid_.cells / block_;
-    blocks_.cell = grid_.cell * block_;
-    blocks_.stride = {1, blocks_.cells.x(), std::ptrdiff_t(blocks_.cells.x()) * blocks_.cells.y()};
-    blocks_.offset = 0;
-    blocks_.total = std::size_t(blocks_.stride[2]) * std::size_t(blocks_.cells.z());
-}
-
-void FineCoupling::find_open(const Field* cell_solid)
-{
-    open_blocks_.resize(blocks_.total);
-    parallel_blocks(std::size_t(blocks_.cells.z()), planes_per_slab, [&](std::size_t begin, std::size_t end) {
-        const auto first = open_blocks_.begin() + std::ptrdiff_t(begin) * blocks_.stride[2];
-        std::fill(first, open_blocks_.begin() + std::ptrdiff_t(end) * blocks_.stride[2], 0.0);
-        for (int k = int(begin) * block_; k < int(end) * block_; ++k)
-            for (int j = 0; j < grid_.cells.y(); ++j) {
-                const std::size_t c0 = layout_.index(0, j, k);
-                double* sum = open_blocks_.data() + (k / block_) * blocks_.stride[2] + (j / block_) * blocks_.stride[1];
-                for (int i = 0; i < grid_.cells.x(); ++i) {
-                    const double open = cell_solid ? 1.0 - (*cell_solid)[c0 + std::size_t(i)] : 1.0;
-                    open_cells_[c0 + std::size_t(i)] = open;
-                    sum[i / block_] += open;
-                }
-            }
-    });
-}
-
-/// Weights of one row of cells, cut or folded at the sides of the domain. `open` null: solid cells count as well.
-void FineCoupling::add_row(Weights& weights, const Target& target, const Field* open, double radius, double x, double squared, int j,
-                           int k) const
-{
-    const int n = target.cells.x();
-    const double h = target.cell, scale = 4.0 / (radius * radius);
-    const double half = std::sqrt(std::max(radius * radius - squared, 0.0));
-    const int low = int(std::ceil((x - half) / h - 0.5)), high = int(std::floor((x + half) / h - 0.5));
-    const auto weight = [&](int i) {
-        const double dx = (i + 0.5) * h - x;
-        return kernel_table(scale * (dx * dx + squared));
-    };
-    const std::ptrdiff_t base = target.offset + j * target.stride[1] + k * target.stride[2];
-    const auto add_run = [&](int first, int length) {  // appends zeros; returns where they start
-        weights.rows.push_back({std::uint32_t(base + first), k, length});
-        weights.values.resize(weights.values.size() + std::size_t(length), 0.0);
-        return weights.values.data() + weights.values.size() - length;
-    };
-    const auto shut = [&](double* values, int first, int length) {
-        if (open)
-            for (int l = 0; l < length; ++l) values[l] *= (*open)[std::size_t(base + first + l)];
-    };
-    if (low > high) return;
-    if (grid_.periodic(0)) {
-        for (int i = low; i <= high;) {
-            const int first = wrap(i, n), length = std::min(high - i + 1, n - first);
-            double* values = add_run(first, length);
-            for (int l = 0; l < length; ++l) values[l] = weight(i + l);
-            shut(values, first, length);
-            i += length;
-        }
-        return;
-    }
-    if (low >= 0 && high < n) {
-        const int length = high - low + 1;
-        double* values = add_run(low, length);
-        for (int l = 0; l < length; ++l) values[l] = weight(low + l);
-        shut(values, low, length);
-        return;
-    }
-    const bool wide = high - low + 1 >= n;
-    const int first = wide || low < 0 ? 0 : std::min(low, fold(high, n));
-    const int last = wide || high >= n ? n - 1 : std::max(high, fold(low, n));
-    double* values = add_run(first, last - first + 1);
-    for (int i = low; i <= high; ++i) values[fold(i, n) - first] += weight(i);
-    shut(values, first, last - first + 1);
-}
-
-void FineCoupling::add_particle(Weights& weights, const Target& target, const Field& open, double radius, const Vector3d& position) const
-{
-    const Vector3d size = grid_.size();
-    Vector3d x = position - grid_.origin;
-    for (int d = 0; d < 3; ++d) {
-        if (grid_.periodic(d))
-            x[d] -= size[d] * std::floor(x[d] / size[d]);
-        else
-            x[d] = std::clamp(x[d], 0.0, size[d]);
-    }
-    const double h = target.cell;
-    const auto target_cell = [&](int i, int d) { return grid_.periodic(d) ? wrap(i, target.cells[d]) : fold(i, target.cells[d]); };
-    const std::size_t first_row = weights.rows.size(), first_value = weights.values.size();
-    for (const Field* pass : {&open, static_cast<const Field*>(nullptr)}) {  // the second when every cell around is solid
-        for (int k = int(std::ceil((x.z() - radius) / h - 0.5)); k <= int(std::floor((x.z() + radius) / h - 0.5)); ++k) {
-            const double dz = (k + 0.5) * h - x.z(), reach = std::sqrt(std::max(radius * radius - dz * dz, 0.0));
-            for (int j = int(std::ceil((x.y() - reach) / h - 0.5)); j <= int(std::floor((x.y() + reach) / h - 0.5)); ++j) {
-                const double dy = (j + 0.5) * h - x.y();
-                add_row(weights, target, pass, radius, x.x(), dy * dy + dz * dz, target_cell(j, 1), target_cell(k, 2));
-            }
-        }
-        double sum = 0.0;
-        for (std::size_t v = first_value; v < weights.values.size(); ++v) sum += weights.values[v];
-        if (sum > 1e-6 || !pass) {
-            for (std::size_t v = first_value; v < weights.values.size(); ++v) weights.values[v] /= sum;
-            break;
-        }
-        weights.rows.resize(first_row);
-        weights.values.resize(first_value);
-    }
-    std::int32_t low = target.cells.z(), high = -1;
-    for (std::size_t r = first_row; r < weights.rows.size(); ++r) {
-        low = std::min(low, weights.rows[r].plane);
-        high = std::max(high, weights.rows[r].plane);
-    }
-    weights.low_plane.push_back(low);
-    weights.high_plane.push_back(high);
-    weights.first_row.push_back(weights.rows.size());
-    weights.first_value.push_back(weights.values.size());
-}
-
-void FineCoupling::find_weights(std::vector<Weights>& chunks, const Target& target, const Field& open, double factor,
-                                std::span<const Vector3d> positions, std::span<const double> diameters) const
-{
-    chunks.resize((positions.size() + particles_per_chunk - 1) / particles_per_chunk);
-    parallel_blocks(positions.size(), particles_per_chunk, [&](std::size_t begin, std::size_t end) {
-        Weights& weights = chunks[begin / particles_per_chunk];
-        weights.rows.clear(), weights.values.clear(), weights.low_plane.clear(), weights.high_plane.clear();
-        weights.first_row.assign(1, 0), weights.first_value.assign(1, 0);
-        for (std::size_t p = begin; p < end; ++p) {
-            const double support = std::max(options_.volume_support * diameters[p], options_.smallest_support * grid_.cell);
-            add_particle(weights, target, open, 0.5 * factor * support, positions[p]);
-        }
-    });
-}
-
-void FineCoupling::place(std::span<const Vector3d> positions, std::span<const double> diameters, const Field* cell_solid)
-{
-    count_ = positions.size();
-    choose_blocks(diameters);
-    find_open(cell_solid);
-    find_weights(volume_, cells_, open_cells_, 1.0, positions, diameters);
-    find_weights(felt_, blocks_, open_blocks_, options_.felt_support / options_.volume_support, positions, diameters);
-}
-
-/// quads[c] += w_ic value(i) for all particles: each slab of planes takes its rows from all particles in order, so that no two
-/// threads meet and the order of additions does not depend on their number.
+/// quads[c] += w_ic value(i) for all particles: each slab of planes takes its rows from all particles in order, so that
+/// no two threads meet and the order of additions does not depend on their number.
 template <class Value>
-void FineCoupling::scatter(const std::vector<Weights>& chunks, const Target& target, Quads& quads, const Value& value) const
+void FineCoupling::scatter(const std::vector<Weights>& chunks, const Target& target, Quads& quads,
+                           const Value& value) const
 {
     quads.resize(4 * target.total);
-    const auto first_cell = [&](std::size_t plane) { return std::size_t(target.offset) + plane * std::size_t(target.stride[2]); };
+    const auto first_cell = [&](std::size_t plane) {
+        return std::size_t(target.offset) + plane * std::size_t(target.stride[2]);
+    };
     parallel_blocks(std::size_t(target.cells.z()), planes_per_slab, [&](std::size_t begin, std::size_t end) {
         const std::size_t last = end == std::size_t(target.cells.z()) ? target.total : first_cell(end);
         std::fill(quads.begin() + std::ptrdiff_t(4 * first_cell(begin)), quads.begin() + std::ptrdiff_t(4 * last), 0.0);
@@ -258,7 +54,7 @@ void FineCoupling::scatter(const std::vector<Weights>& chunks, const Target& tar
             const Weights& w = chunks[chunk];
             for (std::size_t p = 0; p < w.low_plane.size(); ++p) {
                 if (w.high_plane[p] < int(begin) || w.low_plane[p] >= int(end)) continue;
-                const Vector4d amount = value(chunk * particles_per_chunk + p);
+                const Vector4d amount = value(order_[chunk * particles_per_chunk + p]);
                 const double* weight = w.values.data() + w.first_value[p];
                 for (std::size_t r = w.first_row[p]; r < w.first_row[p + 1]; ++r) {
                     const Row& row = w.rows[r];
@@ -287,13 +83,13 @@ void FineCoupling::gather(const std::vector<Weights>& chunks, const Value& value
                 for (int l = 0; l < row.length; ++l) sum += weight[l] * value(std::size_t(row.start) + std::size_t(l));
                 weight += row.length;
             }
-            sums[chunk * particles_per_chunk + p] = sum;
+            sums[order_[chunk * particles_per_chunk + p]] = sum;
         }
     });
 }
 
-/// Per block the mean over its cells of four values, weighted by how open the cells are (all alike in a block that is solid throughout).
-/// fill(j, k, rows) gives the values of a row of cells, rows[v][i].
+/// Per block the mean over its cells of four values, weighted by how open the cells are (all alike in a block that is
+/// solid throughout). fill(j, k, rows) gives the values of a row of cells, rows[v][i].
 template <class Fill>
 void FineCoupling::average_blocks(Quads& quads, const Fill& fill) const
 {
@@ -301,8 +97,8 @@ void FineCoupling::average_blocks(Quads& quads, const Fill& fill) const
     const double closed = double(block_) * block_ * block_;
     const auto n = std::size_t(grid_.cells.x());
     parallel_blocks(std::size_t(blocks_.cells.z()), planes_per_slab, [&](std::size_t begin, std::size_t end) {
-        std::fill(quads.begin() + 4 * std::ptrdiff_t(begin) * blocks_.stride[2], quads.begin() + 4 * std::ptrdiff_t(end) * blocks_.stride[2],
-                  0.0);
+        std::fill(quads.begin() + 4 * std::ptrdiff_t(begin) * blocks_.stride[2],
+                  quads.begin() + 4 * std::ptrdiff_t(end) * blocks_.stride[2], 0.0);
         thread_local std::vector<double> buffer;
         buffer.resize(4 * n);
         double* const rows[4] = {buffer.data(), buffer.data() + n, buffer.data() + 2 * n, buffer.data() + 3 * n};
@@ -315,8 +111,10 @@ void FineCoupling::average_blocks(Quads& quads, const Fill& fill) const
                     const double open = open_blocks_[b0 + std::size_t(b)];
                     Vector4d sum = Vector4d::Zero();
                     for (int l = 0; l < block_; ++l, ++i)
-                        sum += (open > 0.0 ? open_cells[i] : 1.0) * Vector4d(rows[0][i], rows[1][i], rows[2][i], rows[3][i]);
-                    Eigen::Map<Vector4d>(quads.data() + 4 * (b0 + std::size_t(b))) += sum / (open > 0.0 ? open : closed);
+                        sum += (open > 0.0 ? open_cells[i] : 1.0) *
+                               Vector4d(rows[0][i], rows[1][i], rows[2][i], rows[3][i]);
+                    Eigen::Map<Vector4d>(quads.data() + 4 * (b0 + std::size_t(b))) +=
+                        sum / (open > 0.0 ? open : closed);
                 }
             }
     });
@@ -354,7 +152,8 @@ void FineCoupling::deposit_volume(Flow& flow, std::span<const double> volumes, s
     flow.change_void_fraction(void_fraction_);
 }
 
-/// Solid flux on the faces of one component: mean of the two cells; none through walls and inlets, that of the cell through outlets.
+/// Solid flux on the faces of one component: mean of the two cells; none through walls and inlets, that of the cell
+/// through outlets.
 void FineCoupling::deposit_flux(int d, Field& flux) const
 {
     const Vector3i faces = grid_.cells + Vector3i::Unit(d);
@@ -422,7 +221,8 @@ void FineCoupling::gather_pressure_gradient(const Flow& flow, std::span<FeltFlow
                 }
                 weight += row.length;
             }
-            felt[chunk * particles_per_chunk + particle].pressure_gradient = 0.5 / grid_.cell * Vector3d(gx, gy, gz);
+            felt[order_[chunk * particles_per_chunk + particle]].pressure_gradient =
+                0.5 / grid_.cell * Vector3d(gx, gy, gz);
         }
     });
 }
@@ -442,7 +242,8 @@ void FineCoupling::feel(const Flow& flow, std::span<FeltFlow> felt) const
         }
     });
     sums_.resize(count_);
-    gather(felt_, [&](std::size_t b) { return quad(block_quads_, b); }, sums_);
+    gather(
+        felt_, [&](std::size_t b) { return quad(block_quads_, b); }, sums_);
     for (std::size_t i = 0; i < count_; ++i) {
         felt[i].void_fraction = sums_[i][0];
         felt[i].velocity = sums_[i].tail<3>() / sums_[i][0];
@@ -472,13 +273,16 @@ void FineCoupling::deposit_drag(Flow& flow, std::span<const double> coefficients
     });
     PorousFields& fields = flow.porous_fields_for_writing();
     const Vector3i n = grid_.cells;
-    const auto half_outside = [&](int d, int f) { return (f == 0 && grid_.outlet(d, 0)) || (f == n[d] && grid_.outlet(d, 1)) ? 2.0 : 1.0; };
+    const auto half_outside = [&](int d, int f) {
+        return (f == 0 && grid_.outlet(d, 0)) || (f == n[d] && grid_.outlet(d, 1)) ? 2.0 : 1.0;
+    };
     // faces of plane k need the cells of planes k - 1 and k
     parallel_blocks(std::size_t(n.z()) + 1, planes_per_slab, [&](std::size_t begin, std::size_t end) {
         const std::size_t row_size = 4 * std::size_t(n.x());
         std::vector<double> here(row_size), below(row_size), behind(row_size);
         const auto load = [&](int j, int k, std::vector<double>& row) {
-            const bool outside = (!grid_.periodic(1) && (j < 0 || j >= n.y())) || (!grid_.periodic(2) && (k < 0 || k >= n.z()));
+            const bool outside =
+                (!grid_.periodic(1) && (j < 0 || j >= n.y())) || (!grid_.periodic(2) && (k < 0 || k >= n.z()));
             if (outside)
                 std::fill(row.begin(), row.end(), 0.0);
             else
@@ -488,12 +292,13 @@ void FineCoupling::deposit_drag(Flow& flow, std::span<const double> coefficients
             if (grid_.periodic(d)) i = wrap(i, n[d]);
             return i >= 0 && i < n[d] ? shares[std::size_t(i)] : 0.0;
         };
-        const auto put = [&](int d, std::size_t f0, int count, double low, double high, const std::vector<double>& before,
-                             const std::vector<double>& after) {
+        const auto put = [&](int d, std::size_t f0, int count, double low, double high,
+                             const std::vector<double>& before, const std::vector<double>& after) {
             for (int i = 0; i < count; ++i) {
-                fields.drag_rate[d][f0 + std::size_t(i)] = low * before[4 * std::size_t(i)] + high * after[4 * std::size_t(i)];
-                fields.drag_force[d][f0 + std::size_t(i)] =
-                    low * before[4 * std::size_t(i) + 1 + std::size_t(d)] + high * after[4 * std::size_t(i) + 1 + std::size_t(d)];
+                fields.drag_rate[d][f0 + std::size_t(i)] =
+                    low * before[4 * std::size_t(i)] + high * after[4 * std::size_t(i)];
+                fields.drag_force[d][f0 + std::size_t(i)] = low * before[4 * std::size_t(i) + 1 + std::size_t(d)] +
+                                                            high * after[4 * std::size_t(i) + 1 + std::size_t(d)];
             }
         };
         for (int k = int(begin); k < int(end); ++k) {
@@ -504,9 +309,11 @@ void FineCoupling::deposit_drag(Flow& flow, std::span<const double> coefficients
                 const std::size_t f0 = layout_.index(0, j, k);
                 const double half_y = half_outside(1, j), half_z = half_outside(2, k);
                 if (j < n.y())
-                    put(2, f0, n.x(), half_z * share(high_share_[2], k - 1, 2), half_z * share(low_share_[2], k, 2), behind, here);
+                    put(2, f0, n.x(), half_z * share(high_share_[2], k - 1, 2), half_z * share(low_share_[2], k, 2),
+                        behind, here);
                 if (k < n.z())
-                    put(1, f0, n.x(), half_y * share(high_share_[1], j - 1, 1), half_y * share(low_share_[1], j, 1), below, here);
+                    put(1, f0, n.x(), half_y * share(high_share_[1], j - 1, 1), half_y * share(low_share_[1], j, 1),
+                        below, here);
                 if (j < n.y() && k < n.z())
                     for (int i = 1; i < n.x(); ++i) {
                         const double low = high_share_[0][std::size_t(i) - 1], high = low_share_[0][std::size_t(i)];
@@ -517,8 +324,10 @@ void FineCoupling::deposit_drag(Flow& flow, std::span<const double> coefficients
                 if (j < n.y() && k < n.z())
                     for (int i : {0, n.x()}) {
                         const double half_x = half_outside(0, i);
-                        const double low = half_x * share(high_share_[0], i - 1, 0), high = half_x * share(low_share_[0], i, 0);
-                        const std::size_t before = 4 * std::size_t(wrap(i - 1, n.x())), after = 4 * std::size_t(wrap(i, n.x()));
+                        const double low = half_x * share(high_share_[0], i - 1, 0),
+                                     high = half_x * share(low_share_[0], i, 0);
+                        const std::size_t before = 4 * std::size_t(wrap(i - 1, n.x())),
+                                          after = 4 * std::size_t(wrap(i, n.x()));
                         fields.drag_rate[0][f0 + std::size_t(i)] = low * here[before] + high * here[after];
                         fields.drag_force[0][f0 + std::size_t(i)] = low * here[before + 1] + high * here[after + 1];
                     }
@@ -540,7 +349,8 @@ void FineCoupling::drag_lag(const Flow& flow, std::span<const double> coefficien
         const auto change = [&](int d, std::ptrdiff_t f) { return us[d][f] - u[d][f]; };
         for (int i = 0; i + 1 < n; ++i) rows[0][i] = low_x[i] * change(0, c0 + i) + high_x[i] * change(0, c0 + i + 1);
         // u* has no periodic copy at the far side yet
-        rows[0][n - 1] = low_x[n - 1] * change(0, c0 + n - 1) + high_x[n - 1] * change(0, grid_.periodic(0) ? c0 : c0 + n);
+        rows[0][n - 1] =
+            low_x[n - 1] * change(0, c0 + n - 1) + high_x[n - 1] * change(0, grid_.periodic(0) ? c0 : c0 + n);
         for (int d = 1; d < 3; ++d) {
             const auto m = std::size_t(position[d]);
             const std::ptrdiff_t s = layout_.stride[d];
@@ -551,7 +361,8 @@ void FineCoupling::drag_lag(const Flow& flow, std::span<const double> coefficien
         std::fill(rows[3], rows[3] + n, 0.0);
     });
     sums_.resize(count_);
-    gather(felt_, [&](std::size_t b) { return quad(block_quads_, b); }, sums_);
+    gather(
+        felt_, [&](std::size_t b) { return quad(block_quads_, b); }, sums_);
     for (std::size_t i = 0; i < count_; ++i) lag[i] = coefficients[i] * sums_[i].head<3>();
 }
 

@@ -1,9 +1,10 @@
 #pragma once
 /// \file fluid/porous.h
-/// Fines in the flow: kernel averages both ways. Each particle spreads its volume and its reaction over cells around it, and feels
-/// averages of the flow, all with the weights  w_ic = k(2 dist/R) (1 - phi_c) / sum  of Peskin's four-point kernel
-/// [Huang et al., eq. 15, with 4 r^2 for the printed 4 r^4], R the support radius. Cells beyond a wall are folded back by
-/// reflection, cells in resolved grains (phi_c) take no part, and the weights of each particle sum to 1.
+/// Fines in the flow: kernel averages both ways. Each particle spreads its volume and its reaction over cells around
+/// it, and feels averages of the flow, all with the weights  w_ic = k(2 dist/R) (1 - phi_c) / sum  of Peskin's
+/// four-point kernel [Huang et al., eq. 15, with 4 r^2 for the printed 4 r^4], R the support radius. Cells beyond a
+/// wall are folded back by reflection, cells in resolved grains (phi_c) take no part, and the weights of each particle
+/// sum to 1.
 #include <span>
 #include <vector>
 
@@ -15,31 +16,35 @@ namespace coral::fluid {
 double peskin_kernel(double r);
 
 struct KernelOptions {
-    double volume_support = 2.0;  ///< diameter of the support over the particle diameter, for void fraction and pressure force
-    double felt_support = 4.0;    ///< the same for what a particle feels and for its drag reaction
+    double volume_support =
+        2.0;  ///< diameter of the support over the particle diameter, for void fraction and pressure force
+    double felt_support = 4.0;      ///< the same for what a particle feels and for its drag reaction
     double smallest_support = 3.0;  ///< lower limit of the volume support [cells]; the felt one keeps its ratio to it
     double smallest_void_fraction = 0.15;
-    int coupling_cells = 0;  ///< felt averages work on blocks of this many cells along an edge; 0 chooses (1 when d < 3 cells)
+    int coupling_cells =
+        0;  ///< felt averages work on blocks of this many cells along an edge; 0 chooses (1 when d < 3 cells)
 };
 
 /// What one particle feels.
 struct FeltFlow {
-    double void_fraction = 1.0;                                     ///< wide kernel
-    Eigen::Vector3d velocity = Eigen::Vector3d::Zero();             ///< interstitial, wide kernel [m/s]
-    Eigen::Vector3d pressure_gradient = Eigen::Vector3d::Zero();    ///< of the kinematic pressure, volume kernel [m/s2]
+    double void_fraction = 1.0;                                   ///< wide kernel
+    Eigen::Vector3d velocity = Eigen::Vector3d::Zero();           ///< interstitial, wide kernel [m/s]
+    Eigen::Vector3d pressure_gradient = Eigen::Vector3d::Zero();  ///< of the kinematic pressure, volume kernel [m/s2]
 };
 
 /// Kernel weights of a set of fines for one step. Call, each flow step:
 ///     place(positions, diameters, cell_solid); deposit_volume(flow, volumes, velocities); feel(flow, felt);
 ///     ... drag from fluid/drag.h: b_i and F_i with F_i' = dF_i/du = b_i ...
-///     deposit_drag(flow, b, F); flow.predict(dt); drag_lag(flow, lag) -> F_i + lag_i is the drag the particle really gets.
+///     deposit_drag(flow, b, F); flow.predict(dt); drag_lag(flow, lag) -> F_i + lag_i is the drag the particle really
+///     gets.
 /// Then fluid + particles exchange momentum to round-off.
 class FineCoupling {
 public:
     explicit FineCoupling(const GridSpec& grid, const KernelOptions& options = {});
 
     /// Finds the weights. A particle outside the domain is treated as if on its border.
-    /// \param positions [m], \param diameters [m] \param cell_solid  ImmersedBodies::cell_solid_fraction(), or nullptr without grains
+    /// \param positions [m], \param diameters [m] \param cell_solid  ImmersedBodies::cell_solid_fraction(), or nullptr
+    /// without grains
     void place(std::span<const Eigen::Vector3d> positions, std::span<const double> diameters, const Field* cell_solid);
 
     /// eps_c = 1 - sum_i w_ic V_i / h3 and the solid flux J_s = sum_i w V_i v_i / h3 on faces, given to the flow.
@@ -84,12 +89,15 @@ private:
     };
     using Quads = Field;  // four values per cell: volume and flux, coefficient and force, ...
 
+    void sort_particles(std::span<const Eigen::Vector3d> positions);
     void choose_blocks(std::span<const double> diameters);
     void find_open(const Field* cell_solid);
     void find_weights(std::vector<Weights>& chunks, const Target& target, const Field& open, double factor,
                       std::span<const Eigen::Vector3d> positions, std::span<const double> diameters) const;
-    void add_particle(Weights& weights, const Target& target, const Field& open, double radius, const Eigen::Vector3d& position) const;
-    void add_row(Weights& weights, const Target& target, const Field* open, double radius, double x, double squared, int j, int k) const;
+    void add_particle(Weights& weights, const Target& target, const Field& open, double radius,
+                      const Eigen::Vector3d& position) const;
+    void add_row(Weights& weights, const Target& target, const Field* open, double radius, double x, double squared,
+                 int j, int k) const;
     template <class Value>
     void scatter(const std::vector<Weights>& chunks, const Target& target, Quads& quads, const Value& value) const;
     template <class Value>
@@ -106,6 +114,7 @@ private:
     std::size_t count_ = 0;
     int block_ = 1;
     Target cells_, blocks_;
+    std::vector<std::size_t> order_;  // of the particles in the weights: neighbours follow each other
     std::vector<Weights> volume_, felt_;
     Field open_cells_, open_blocks_;  // 1 - phi per cell (padded); its sum per block
     Field void_fraction_;             // of the next step; changes places with the flow's
@@ -113,7 +122,8 @@ private:
     Quads cell_quads_;
     mutable Quads block_quads_;
     mutable std::vector<Eigen::Vector4d> sums_;
-    std::array<std::vector<double>, 3> low_share_, high_share_;  // per axis: how a cell's reaction divides between its two faces
+    std::array<std::vector<double>, 3> low_share_,
+        high_share_;  // per axis: how a cell's reaction divides between its two faces
 };
 
 }  // namespace coral::fluid

@@ -46,7 +46,8 @@ Corners corners_of(const GridSpec& grid, int component, const BodyShape& shape, 
         const double shift = d == component ? 0.5 : 0.0;  // volume i spans (i - shift, i + 1 - shift) cells
         const int first = component == cells_component || d != component ? 0 : grid.first_unknown(d);
         const int last = component == cells_component || d != component ? grid.cells[d] : grid.last_unknown(d);
-        const double low = (box_low[d] - grid.origin[d]) / grid.cell + shift, high = (box_high[d] - grid.origin[d]) / grid.cell + shift;
+        const double low = (box_low[d] - grid.origin[d]) / grid.cell + shift,
+                     high = (box_high[d] - grid.origin[d]) / grid.cell + shift;
         if (grid.periodic(d)) {
             c.low[d] = int(std::floor(low));
             c.high[d] = std::min(int(std::floor(high)) + 1, c.low[d] + grid.cells[d]);
@@ -60,8 +61,9 @@ Corners corners_of(const GridSpec& grid, int component, const BodyShape& shape, 
     return c;
 }
 
-/// Distances on the lattice. Blocks of points that lie further from the surface than their own size plus the diagonal of a cell are
-/// settled by one query: all volumes with a corner there are then all solid or all fluid, whatever the exact value.
+/// Distances on the lattice. Blocks of points that lie further from the surface than their own size plus the diagonal
+/// of a cell are settled by one query: all volumes with a corner there are then all solid or all fluid, whatever the
+/// exact value.
 void sample(Corners& c, const BodyShape& shape, const RigidMotion& motion)
 {
     c.distance.resize(c.index(0, 0, c.points.z()));
@@ -111,11 +113,15 @@ double solid_fraction(const Corners& c, int i, int j, int k)
     return all > 0.0 ? solid / all : 0.0;
 }
 
-int wrap(int i, int n) { return ((i % n) + n) % n; }
+int wrap(int i, int n)
+{
+    return ((i % n) + n) % n;
+}
 
 }  // namespace
 
-SolidSet find_solid(const GridSpec& grid, const Layout& layout, int component, const BodyShape& shape, const RigidMotion& motion)
+SolidSet find_solid(const GridSpec& grid, const Layout& layout, int component, const BodyShape& shape,
+                    const RigidMotion& motion)
 {
     constexpr double negligible = 1e-6;
     SolidSet set;
@@ -130,11 +136,13 @@ SolidSet find_solid(const GridSpec& grid, const Layout& layout, int component, c
                 if (phi < negligible) continue;
                 const auto at = std::uint32_t(layout.index(wrapped(i, 0), wrapped(j, 1), wrapped(k, 2)));
                 if (phi < 1.0 - negligible) {
-                    set.cuts.push_back({at, std::int16_t(i), std::int16_t(j), std::int16_t(k), false, float(phi), 0.0F});
+                    set.cuts.push_back(
+                        {at, std::int16_t(i), std::int16_t(j), std::int16_t(k), false, float(phi), 0.0F});
                     continue;
                 }
                 SolidRun* last = set.runs.empty() ? nullptr : &set.runs.back();
-                if (last && last->j == j && last->k == k && last->i + last->length == i && last->at + std::uint32_t(last->length) == at)
+                if (last && last->j == j && last->k == k && last->i + last->length == i &&
+                    last->at + std::uint32_t(last->length) == at)
                     ++last->length;
                 else
                     set.runs.push_back({at, std::int16_t(i), std::int16_t(j), std::int16_t(k), 1});

@@ -30,7 +30,8 @@ TEST(Drag, of_one_slow_sphere_is_that_of_stokes)
 {
     const double slip = 1e-9;
     for (const DragLaw law : {DragLaw::gidaspow, DragLaw::wen_yu, DragLaw::schiller_naumann})
-        EXPECT_NEAR(drag_coefficient(law, 1.0, slip, diameter, density, nu), 3.0 * std::numbers::pi * density * nu * diameter,
+        EXPECT_NEAR(drag_coefficient(law, 1.0, slip, diameter, density, nu),
+                    3.0 * std::numbers::pi * density * nu * diameter,
                     1e-3 * 3.0 * std::numbers::pi * density * nu * diameter);
 }
 

@@ -51,7 +51,8 @@ FlowOptions liquid(double nu)
 /// A rough divergent start, so that every term has work to do.
 Vector3d stirred(const Vector3d& x, int)
 {
-    return {std::sin(90 * x.x() + 3 * x.y()) * std::cos(40 * x.z()), std::cos(70 * x.y() - 20 * x.z()), std::sin(55 * x.z() + 60 * x.x())};
+    return {std::sin(90 * x.x() + 3 * x.y()) * std::cos(40 * x.z()), std::cos(70 * x.y() - 20 * x.z()),
+            std::sin(55 * x.z() + 60 * x.x())};
 }
 
 }  // namespace
@@ -90,7 +91,8 @@ TEST(Flow, balances_momentum_in_closed_and_periodic_boxes)
 
 TEST(Flow, between_outlets_of_different_pressure_reaches_the_parabola_of_poiseuille)
 {
-    // plane channel of gap H: u(y) = dp/(2 mu L) y (H - y); the scheme's own profile is exact at centres up to +dp h2/(8 mu L)
+    // plane channel of gap H: u(y) = dp/(2 mu L) y (H - y); the scheme's own profile is exact at centres up to +dp
+    // h2/(8 mu L)
     GridSpec grid = box({8, 12, 4}, 1e-3, BoundaryKind::outlet, BoundaryKind::wall, BoundaryKind::periodic);
     const double dp = 0.02, mu = 1e-2, L = 8e-3, H = 12e-3;
     grid.boundary[x_minus].pressure = dp;

@@ -60,7 +60,10 @@ ArrayScene array_scene(double solid_fraction, int cells, const Vector3d& centre,
     options.kinematic_viscosity = 1e-4;
     options.convection = Convection::none;
     options.body_acceleration = {1e-3, 0.0, 0.0};
-    ArrayScene scene{Flow(grid, options), ImmersedBodies(grid, forcing), {at(centre * L)}, 0.5 * L * std::cbrt(6.0 * solid_fraction / pi)};
+    ArrayScene scene{Flow(grid, options),
+                     ImmersedBodies(grid, forcing),
+                     {at(centre * L)},
+                     0.5 * L * std::cbrt(6.0 * solid_fraction / pi)};
     scene.bodies.add(sphere_shape(2.0 * scene.radius), scene.motions[0]);
     scene.bodies.place(scene.motions);
     return scene;
@@ -80,7 +83,8 @@ ArrayDrag run(ArrayScene& scene, int steps, double dt_factor)
     const FlowOptions& o = flow.options();
     const double driving = o.density * o.body_acceleration.x() * flow.grid().size().prod();
     ArrayDrag result;
-    const double stokes = 6.0 * pi * o.density * o.kinematic_viscosity * scene.radius * flow.mean_superficial_velocity().x();
+    const double stokes =
+        6.0 * pi * o.density * o.kinematic_viscosity * scene.radius * flow.mean_superficial_velocity().x();
     result.K = force.x() / stokes;  // the measured force: it follows the velocity long before the flow is steady
     result.force_balance = force.x() / driving - 1.0;
     result.momentum_error = flow.momentum().relative_error();
@@ -99,14 +103,16 @@ TEST(ImmersedBodies, see_the_volume_of_a_sphere)
     EXPECT_NEAR(bodies.seen_volume(0) / (pi / 6 * 0.216), 1.0, 0.01);
     Flow flow(grid, {});
     const FluidAction action = bodies.measure(flow, 1.0, motions)[0];
-    // solid faces only resist; cut faces hardly do in a fluid at rest: the forced mass lies just below the displaced one
+    // solid faces only resist; cut faces hardly do in a fluid at rest: the forced mass lies just below the displaced
+    // one
     EXPECT_LT(action.forced_mass.maxCoeff(), 1000.0 * pi / 6 * 0.216);
     EXPECT_GT(action.forced_mass.minCoeff(), 0.8 * 1000.0 * pi / 6 * 0.216);
 }
 
 TEST(ImmersedBodies, are_the_same_whatever_the_shortcut_for_far_cells_skips)
 {
-    // the corner rule applied to every cell by itself, for a turned box that is no exact distance field far from its faces
+    // the corner rule applied to every cell by itself, for a turned box that is no exact distance field far from its
+    // faces
     BodyShape box;
     box.box_max = Vector3d(0.21, 0.13, 0.3);
     box.box_min = -box.box_max;
@@ -132,7 +138,8 @@ TEST(ImmersedBodies, are_the_same_whatever_the_shortcut_for_far_cells_skips)
                     const double d = distance(motion.orientation.conjugate() * (corner - motion.position));
                     solid += std::max(-d, 0.0), all += std::abs(d);
                 }
-                EXPECT_NEAR(bodies.cell_solid_fraction()[layout.index(i, j, k)], solid / all, 2e-6) << i << " " << j << " " << k;
+                EXPECT_NEAR(bodies.cell_solid_fraction()[layout.index(i, j, k)], solid / all, 2e-6)
+                    << i << " " << j << " " << k;
             }
 }
 
@@ -150,7 +157,8 @@ TEST(ImmersedBodies, in_a_cubic_array_have_the_drag_of_zick_and_homsy)
         EXPECT_NEAR(drag.K / c.K, 1.0, 0.03) << c.solid_fraction;
         EXPECT_NEAR(drag.force_balance, 0.0, 0.03);
         EXPECT_LT(drag.momentum_error, 1e-10);
-        RecordProperty("K_over_reference_c" + std::to_string(int(1000 * c.solid_fraction)), std::to_string(drag.K / c.K));
+        RecordProperty("K_over_reference_c" + std::to_string(int(1000 * c.solid_fraction)),
+                       std::to_string(drag.K / c.K));
     }
 }
 
@@ -311,7 +319,8 @@ TEST(ImmersedBodies, give_the_same_bits_with_one_and_two_threads_and_after_a_res
 
 TEST(ImmersedBodies, let_the_sphere_of_ten_cate_fall_as_measured)
 {
-    // E4, Re 31.9, 8 cells per diameter, one quarter of the tank with two symmetry planes; peak 0.1226 m/s (reference/ten_cate_2002_cases.csv)
+    // E4, Re 31.9, 8 cells per diameter, one quarter of the tank with two symmetry planes; peak 0.1226 m/s
+    // (reference/ten_cate_2002_cases.csv)
     const double d = 0.015, cell = d / 8, rho = 960.0, nu = 0.058 / rho, rho_p = 1120.0, g = 9.81;
     GridSpec grid;
     grid.cell = cell;

@@ -14,14 +14,16 @@ using namespace coral::fluid;
 namespace {
 
 enum class Ends { neumann, dirichlet_high, dirichlet_low, dirichlet_both, periodic };
-const std::vector<Ends> all_ends = {Ends::neumann, Ends::dirichlet_high, Ends::dirichlet_low, Ends::dirichlet_both, Ends::periodic};
+const std::vector<Ends> all_ends = {Ends::neumann, Ends::dirichlet_high, Ends::dirichlet_low, Ends::dirichlet_both,
+                                    Ends::periodic};
 
 void set_ends(GridSpec& grid, int axis, Ends ends)
 {
     const auto kind = [](bool outlet) { return outlet ? BoundaryKind::outlet : BoundaryKind::slip; };
     grid.boundary[2 * axis].kind = kind(ends == Ends::dirichlet_low || ends == Ends::dirichlet_both);
     grid.boundary[2 * axis + 1].kind = kind(ends == Ends::dirichlet_high || ends == Ends::dirichlet_both);
-    if (ends == Ends::periodic) grid.boundary[2 * axis].kind = grid.boundary[2 * axis + 1].kind = BoundaryKind::periodic;
+    if (ends == Ends::periodic)
+        grid.boundary[2 * axis].kind = grid.boundary[2 * axis + 1].kind = BoundaryKind::periodic;
 }
 
 /// Seven-point Laplacian by the definition of the boundary conditions, cell by cell.
@@ -123,7 +125,8 @@ TEST(Poisson, gives_the_same_bits_with_one_and_two_threads)
 
 TEST(Poisson, is_exact_for_odd_even_and_single_cells_across_the_planes)
 {
-    for (const Eigen::Vector3i& cells : {Eigen::Vector3i(1, 1, 5), Eigen::Vector3i(2, 3, 7), Eigen::Vector3i(5, 4, 6), Eigen::Vector3i(7, 1, 9)}) {
+    for (const Eigen::Vector3i& cells :
+         {Eigen::Vector3i(1, 1, 5), Eigen::Vector3i(2, 3, 7), Eigen::Vector3i(5, 4, 6), Eigen::Vector3i(7, 1, 9)}) {
         GridSpec grid;
         grid.cells = cells;
         grid.cell = 0.2;

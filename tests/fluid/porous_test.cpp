@@ -46,7 +46,8 @@ struct Fines {
         return sum;
     }
     /// One flow step; velocities stay.
-    void step(Flow& flow, FineCoupling& coupling, double dt, ImmersedBodies* bodies = nullptr, std::span<const RigidMotion> motions = {})
+    void step(Flow& flow, FineCoupling& coupling, double dt, ImmersedBodies* bodies = nullptr,
+              std::span<const RigidMotion> motions = {})
     {
         felt.resize(size()), forces.resize(size()), lag.resize(size()), coefficients.resize(size());
         coupling.place(positions, diameters, bodies ? &bodies->cell_solid_fraction() : nullptr);
@@ -55,8 +56,8 @@ struct Fines {
         const FlowOptions& o = flow.options();
         for (std::size_t i = 0; i < size(); ++i) {
             const Vector3d slip = felt[i].velocity - velocities[i];
-            coefficients[i] =
-                drag_coefficient(DragLaw::gidaspow, felt[i].void_fraction, slip.norm(), diameters[i], o.density, o.kinematic_viscosity);
+            coefficients[i] = drag_coefficient(DragLaw::gidaspow, felt[i].void_fraction, slip.norm(), diameters[i],
+                                               o.density, o.kinematic_viscosity);
             forces[i] = coefficients[i] * slip;
         }
         coupling.deposit_drag(flow, coefficients, forces);
@@ -88,7 +89,8 @@ double deposited_volume(const Flow& flow)
     double sum = 0.0;
     for (int k = 0; k < flow.grid().cells.z(); ++k)
         for (int j = 0; j < flow.grid().cells.y(); ++j)
-            for (int i = 0; i < flow.grid().cells.x(); ++i) sum += 1.0 - flow.porous_fields().void_fraction[flow.layout().index(i, j, k)];
+            for (int i = 0; i < flow.grid().cells.x(); ++i)
+                sum += 1.0 - flow.porous_fields().void_fraction[flow.layout().index(i, j, k)];
     return sum * flow.grid().cell_volume();
 }
 
@@ -112,8 +114,8 @@ TEST(FineCoupling, keeps_the_volume_of_fines_anywhere_in_the_domain)
         const GridSpec grid = box({12, 9, 15}, 1e-3, kind);
         Flow flow(grid, {});
         Fines fines = random_fines(grid, 12, 1e-3, 3.2e-3, 0.0, 3);
-        fines.add(Vector3d::Zero(), 2e-3);           // in a corner
-        fines.add(grid.size(), 1e-4);                // a tenth of a cell
+        fines.add(Vector3d::Zero(), 2e-3);            // in a corner
+        fines.add(grid.size(), 1e-4);                 // a tenth of a cell
         fines.add(Vector3d(-5e-3, 4e-3, 0.0), 2e-3);  // outside
         KernelOptions options;
         options.smallest_void_fraction = -100.0;  // no clipping: a corner holds the particle eight times
@@ -248,7 +250,8 @@ TEST(FineCoupling, gives_the_same_bits_with_one_and_two_threads)
     EXPECT_EQ(results[0], results[1]);
 }
 
-/// Pressure gradient of Ergun at the superficial velocity found, over the driving one, in a periodic bed of jittered spheres.
+/// Pressure gradient of Ergun at the superficial velocity found, over the driving one, in a periodic bed of jittered
+/// spheres.
 double ergun_ratio(double nu, double acceleration, int cells_per_diameter, int steps)
 {
     const int side = 6;  // spheres along an edge; porosity 0.4924 as in the paper's bed
@@ -270,7 +273,8 @@ double ergun_ratio(double nu, double acceleration, int cells_per_diameter, int s
     FineCoupling coupling(grid);
     for (int step = 0; step < steps; ++step) fines.step(flow, coupling, flow.stable_time_step());
     const double U = flow.mean_superficial_velocity().z();
-    return options.density * acceleration / ergun_pressure_gradient(1.0 - fines.solid_volume() / (L * L * L), U, d, 1000.0, nu);
+    return options.density * acceleration /
+           ergun_pressure_gradient(1.0 - fines.solid_volume() / (L * L * L), U, d, 1000.0, nu);
 }
 
 TEST(FineCoupling, in_a_homogeneous_bed_has_the_pressure_gradient_of_ergun)

@@ -1,7 +1,7 @@
 #pragma once
 /// \file fluid/detail/advection.h
-/// Momentum flux of one velocity component through one side of its control volume. Used by the predictor's sweeps and, on the
-/// domain's sides, by the momentum tally: both must see the same formula.
+/// Momentum flux of one velocity component through one side of its control volume. Used by the predictor's sweeps and,
+/// on the domain's sides, by the momentum tally: both must see the same formula.
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -23,7 +23,8 @@ inline double flux_up3(double q, double far_left, double left, double right, dou
 inline double koren_value(double U, double C, double D)
 {
     const double a = C - U, b = D - C;
-    const double size = std::min(2.0 * std::abs(a), std::min((std::abs(a) + 2.0 * std::abs(b)) / 3.0, 2.0 * std::abs(b)));
+    const double size =
+        std::min(2.0 * std::abs(a), std::min((std::abs(a) + 2.0 * std::abs(b)) / 3.0, 2.0 * std::abs(b)));
     return C + (a * b > 0.0 ? 0.5 * std::copysign(size, a) : 0.0);
 }
 
@@ -42,8 +43,8 @@ struct ComponentView {
     double viscous = 0.0;  ///< nu / h [m/s]
 };
 
-/// Flux [m2/s2] through the low side (along `direction`) of the control volume of face f: at the centre of cell f - s when
-/// `direction` is the component's own axis, else at the edge between f - s and f. Positive along +direction.
+/// Flux [m2/s2] through the low side (along `direction`) of the control volume of face f: at the centre of cell f - s
+/// when `direction` is the component's own axis, else at the edge between f - s and f. Positive along +direction.
 template <bool porous, Convection convection>
 inline double low_flux(const ComponentView& view, int direction, std::ptrdiff_t f)
 {

@@ -1,7 +1,8 @@
 #pragma once
 /// \file fluid/detail/cosine_planes.h
 /// Two-dimensional cosine transforms (DCT-II and DCT-III) of planes, two real planes as one complex one.
-/// FFTW's own cosine transforms use no SIMD; the complex ones do [Makhoul, IEEE Trans. Acoust. Speech Signal Process. 28:27, 1980].
+/// FFTW's own cosine transforms use no SIMD; the complex ones do [Makhoul, IEEE Trans. Acoust. Speech Signal Process.
+/// 28:27, 1980].
 #include <cstddef>
 #include <memory>
 #include <mutex>
@@ -17,7 +18,8 @@ public:
     CosinePlanes(std::size_t na, std::size_t nb);
     ~CosinePlanes();
 
-    /// In place on two planes of nb rows of na values, like FFTW's unnormalised REDFT10 in both directions. `second` may be null.
+    /// In place on two planes of nb rows of na values, like FFTW's unnormalised REDFT10 in both directions. `second`
+    /// may be null.
     void forward(double* first, double* second) const;
     /// Like REDFT01 in both directions; forward then backward multiplies by 4 na nb.
     void backward(double* first, double* second) const;

@@ -36,7 +36,8 @@ inline double row_weight(const GridSpec& grid, int axis, int j, int k)
 
 /// Weighted sum over a row of u-like faces from a value(i), i counted from `low`.
 template <class Sum, class Value>
-inline double weighted_row(const GridSpec& grid, int axis, const FaceRange& range, int j, int k, const Sum& sum, const Value& value)
+inline double weighted_row(const GridSpec& grid, int axis, const FaceRange& range, int j, int k, const Sum& sum,
+                           const Value& value)
 {
     double total = sum(range.row_length(), value);
     if (axis == 0 && range.row_length() > 0) {

@@ -1,7 +1,7 @@
 #pragma once
 /// \file fluid/detail/lanes.h
-/// Sums and maxima of rows that may vectorise (built with -fopenmp-simd): the order of additions depends on the machine the library is
-/// built for, never on threads.
+/// Sums and maxima of rows that may vectorise (built with -fopenmp-simd): the order of additions depends on the machine
+/// the library is built for, never on threads.
 #include <cstddef>
 
 namespace coral::fluid::detail {

@@ -10,7 +10,7 @@ namespace coral::fluid::detail {
 
 /// Neighbouring control volumes along x that are all solid.
 struct SolidRun {
-    std::uint32_t at = 0;         ///< linear index of the first
+    std::uint32_t at = 0;              ///< linear index of the first
     std::int16_t i = 0, j = 0, k = 0;  ///< of the first, not wrapped across periodic sides
     std::int16_t length = 0;
 };
@@ -33,6 +33,7 @@ inline constexpr int cells_component = 3;
 
 /// Control volumes of component 0..2 (faces the flow advances) or of the cells (3) that the body at `motion` covers.
 /// phi = sum max(-d, 0) / sum |d| over the eight corners [Huang et al., section 2.3.2, on each staggered volume].
-SolidSet find_solid(const GridSpec& grid, const Layout& layout, int component, const BodyShape& shape, const RigidMotion& motion);
+SolidSet find_solid(const GridSpec& grid, const Layout& layout, int component, const BodyShape& shape,
+                    const RigidMotion& motion);
 
 }  // namespace coral::fluid::detail
