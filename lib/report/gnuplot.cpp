@@ -70,6 +70,26 @@ Range range_of(const Figure& figure, const Panel& panel)
     return range;
 }
 
+/// Distance of ticks that leaves four to eight of them: 1, 2 or 5 times a power of ten. gnuplot's own choice crowds small panels.
+double tick_step(double extent)
+{
+    const double rough = extent / 4, power = std::pow(10, std::floor(std::log10(rough)));
+    return rough / power >= 5 ? 5 * power : rough / power >= 2 ? 2 * power : power;
+}
+
+/// Ticks along x for the data drawn; nothing when the axis has no extent or is logarithmic.
+std::string x_ticks(const Figure& figure)
+{
+    double low = HUGE_VAL, high = -HUGE_VAL;
+    for (const auto& row : figure.table.rows)
+        if (const double* x = std::get_if<double>(&row[1])) {
+            low = std::min(low, *x * figure.x_factor);
+            high = std::max(high, *x * figure.x_factor);
+        }
+    if (figure.kind == FigureKind::bars || figure.x_logarithmic || !(high > low)) return {};
+    return "  set xtics " + to_text(tick_step(high - low)) + "\n";
+}
+
 /// Axis commands; a logarithmic axis only where there is something to show on it, else zero is in sight.
 std::string y_axis(const Figure& figure, const Panel& panel, bool& logarithmic)
 {
@@ -189,7 +209,7 @@ std::string gnuplot_script(const Figure& figure)
             "  set output " + quoted(figure.name + ".") + ".kind\n";
     if (wide) text += "  set multiplot layout 1," + std::to_string(panels) + " title " + quoted(figure.title) + " noenhanced font ',15'\n";
     if (figure.x_logarithmic) text += "  set logscale x\n";
-    text += "  set xlabel " + quoted(figure.x_label) + " noenhanced offset 0,0.4\n";
+    text += "  set xlabel " + quoted(figure.x_label) + " noenhanced offset 0,0.4\n" + x_ticks(figure);
     for (const Panel& panel : figure.panels) {
         bool logarithmic = false;
         const std::string& title = wide ? panel.title : figure.title;

@@ -229,7 +229,7 @@ std::string viewer_controls(const std::vector<std::string>& names)
            "<label>Grains <input type=\"range\" id=\"view-fade\" min=\"5\" max=\"100\" value=\"100\"></label></div>\n<div id=\"viewer\"></div>\n"
            "<p class=\"soft\">Fines by the layer they started in:<span class=\"swatch\" style=\"background:#d55e00\"></span>top"
            "<span class=\"swatch\" style=\"background:#009e73\"></span>middle<span class=\"swatch\" style=\"background:#0072b2\"></span>bottom"
-           "<span class=\"swatch\" style=\"background:#e3cfa4\"></span>other bodies. Drag to turn, wheel to zoom, shift-drag to move; Cut opens the sample from the front.</p>\n"
+           "<span class=\"swatch\" style=\"background:#e3cfa4\"></span>other bodies. Drag to turn, wheel to zoom, shift-drag to move; Cut opens the sample from the front and shows surfaces only: solid looks hollow there.</p>\n"
            "<p class=\"soft\" id=\"viewer-message\"></p>\n";
 }
 
