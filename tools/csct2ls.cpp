@@ -201,6 +201,20 @@ double choose_spacing(const Options& o, const Labelled& stack, const std::vector
     return spacing;
 }
 
+/// Takes out the grains that scaling has made too coarse: level sets need a spacing of half a voxel or more.
+void drop_coarse(morph::Extraction& extraction, const Eigen::Vector3d& voxel_size, double spacing)
+{
+    std::vector<morph::Grain> kept;
+    for (morph::Grain& grain : extraction.grains) {
+        if (grain.scale * voxel_size.minCoeff() <= 2.0 * spacing) kept.push_back(std::move(grain));
+        else extraction.dropped.push_back({grain.box, morph::DropReason::coarse});
+    }
+    if (kept.size() < extraction.grains.size())
+        spdlog::warn("{} grains dropped: scaled by --scale-to, their voxels are more than twice the spacing of {}", extraction.grains.size() - kept.size(),
+                     short_length(spacing));
+    extraction.grains = std::move(kept);
+}
+
 /// Meshes are written into a folder of their own and moved when all is done.
 class MeshFolder {
 public:
@@ -307,6 +321,7 @@ const char* reason_text(morph::DropReason reason)
     switch (reason) {
         case morph::DropReason::border: return "border";
         case morph::DropReason::small: return "small";
+        case morph::DropReason::coarse: return "coarse";
         default: return "thin";
     }
 }
@@ -321,7 +336,7 @@ nlohmann::ordered_json summary_of(const Labelled& stack, const morph::Extraction
     if (stack.closing_radius > 0) json["watershed_closing_radius"] = stack.closing_radius;
     json["grains"] = extraction.grains.size();
     json["dropped"] = extraction.dropped.size();
-    for (const morph::DropReason reason : {morph::DropReason::border, morph::DropReason::small, morph::DropReason::thin})
+    for (const morph::DropReason reason : {morph::DropReason::border, morph::DropReason::small, morph::DropReason::thin, morph::DropReason::coarse})
         json[std::string("dropped_") + reason_text(reason)] =
             std::count_if(extraction.dropped.begin(), extraction.dropped.end(), [&](const auto& d) { return d.reason == reason; });
     std::size_t border = 0, touching = 0, islands = 0;
@@ -359,12 +374,12 @@ std::string human_summary(const Options& o, const nlohmann::ordered_json& json)
     for (const auto& [stage, value] : json["seconds"].items()) seconds += value.get<double>();
     return fmt::format(
         "{}: {} grains, {} of them touching others\n"
-        "dropped: {} ({} at the border, {} too small, {} too thin)\n"
+        "dropped: {} ({} at the border, {} too small, {} too thin, {} too coarse)\n"
         "median diameter {}, intraparticle porosity {:.4f}\n"
         "level sets at {}, volume within {:.3f} %\n"
         "{:.1f} s, {:.0f} MB\n",
         o.output.string(), json["grains"].get<std::size_t>(), json["touching"].get<std::size_t>(), json["dropped"].get<std::size_t>(),
-        json["dropped_border"].get<std::size_t>(), json["dropped_small"].get<std::size_t>(), json["dropped_thin"].get<std::size_t>(),
+        json["dropped_border"].get<std::size_t>(), json["dropped_small"].get<std::size_t>(), json["dropped_thin"].get<std::size_t>(), json["dropped_coarse"].get<std::size_t>(),
         short_length(json["equivalent_diameter_median"].get<double>()), json["intraparticle_porosity"].get<double>(),
         short_length(json["spacing"].get<double>()), 100.0 * std::abs(json["largest_volume_error"].get<double>()), seconds,
         json["peak_memory"].get<double>() / 1e6);
@@ -384,15 +399,16 @@ void run(const Options& o, const cli::Context& context)
     extraction_options.closing_radius = 0.5 * o.throat;
     extraction_options.scale_to = o.scale_to;
     Progress progress("grains", double(std::count_if(stack.labels.begin(), stack.labels.end(), [](std::uint32_t l) { return l != 0; })));
-    const morph::Extraction extraction =
+    morph::Extraction extraction =
         morph::extract_grains(stack.labels, stack.size, stack.voxel_size, extraction_options, [&](double done) { progress.update(done); });
     progress.finish();
     stages.lap("measure");
-    if (extraction.grains.empty())
-        spdlog::warn("no grain is left: {} were dropped; see --border keep and --min-diameter", extraction.dropped.size());
-
     sdf::LevelSetOptions options;
     options.spacing = choose_spacing(o, stack, extraction.grains);
+    drop_coarse(extraction, stack.voxel_size, options.spacing);
+    if (extraction.grains.empty())
+        throw Error(o.stack.front(), fmt::format("no grain is left: {} were dropped", extraction.dropped.size()),
+                    "see --border keep, --min-diameter and --split");
     std::tie(options.inside_band, options.outside_band) = parse_band(o.band);
     sdf::GrainWriter writer(o.output);
     MeshFolder meshes(o.mesh);

@@ -34,9 +34,12 @@ void parallel_blocks(std::size_t count, std::size_t grain, const Body& body)
         for (std::size_t begin = 0; begin < count; begin += grain) detail::run_block(body, begin, std::min(begin + grain, count));
         return;
     }
+    // A context of its own: when a loop around this one fails and is cancelled, this one must still run all its blocks, since TBB
+    // would otherwise end it early without an exception and leave its results half made.
+    tbb::task_group_context whole(tbb::task_group_context::isolated);
     tbb::parallel_for(
         std::size_t{0}, (count + grain - 1) / grain,
-        [&](std::size_t b) { detail::run_block(body, b * grain, std::min((b + 1) * grain, count)); }, tbb::static_partitioner{});
+        [&](std::size_t b) { detail::run_block(body, b * grain, std::min((b + 1) * grain, count)); }, tbb::static_partitioner{}, whole);
 }
 
 /// Sum of body(begin, end) over blocks, added in block order: the same bits for any thread count.

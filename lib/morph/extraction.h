@@ -30,7 +30,7 @@ struct Grain {
     double scale = 1.0;      ///< factor on lengths
 };
 
-enum class DropReason { border, small, thin };
+enum class DropReason { border, small, thin, coarse };
 
 struct Dropped {
     LabelBox box;
