@@ -21,6 +21,7 @@ std::vector<Wall> box_walls(const Eigen::Vector3d& size)
 Sample pack(const Spec& spec, std::uint64_t seed, PackReport& report)
 {
     const auto clock = std::chrono::steady_clock::now();
+    report = {};
     report.warnings = spec.warnings;
     Grains grains = make_grains(spec, seed);
     report.loading_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - clock).count();

@@ -33,6 +33,7 @@ struct PackReport {
 /// 4. Walls stand still, friction is the material's, and the sample comes to rest under its gravity.
 /// 5. The lower corner of the box is shifted to the origin; contacts, springs, gradation, criteria and statistics are stored.
 /// Walls are smooth throughout.
+/// \param report  set anew
 /// \throws UsageError  grains that do not fit
 /// \throws Error       grains lost through a wall, or pressed into each other by more than a quarter of their size
 Sample pack(const Spec& spec, std::uint64_t seed, PackReport& report);
