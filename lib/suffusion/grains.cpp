@@ -65,7 +65,7 @@ Grains::Grains(const Scene& scene, const fluid::GridSpec& grid)
     }
     motions_.resize(immersed_.size());
     before_.assign(bodies_.size(), Vector3d::Zero());
-    change_ = before_;
+    change_ = carried_ = before_;
     forces_.assign(scene.bodies.size(), Vector3d::Zero());
     torques_ = forces_;
 }
@@ -106,7 +106,7 @@ void Grains::measure(fluid::Flow& flow, double dt, Scene& scene)
         before_[b] = scene.world.velocity(id);
         // Eq. 11: the forced fluid moves with the grain and carries inertia M_w instead of the displaced mass; the virtual mass acts on both sides.
         scene.world.set_added_mass(id, actions_[b].forced_mass.array() - displaced + virtual_mass_[b]);
-        const Vector3d force = actions_[b].force - displaced * scene.description.gravity + virtual_mass_[b] / dt * change_[b];
+        const Vector3d force = actions_[b].force + carried_[b] / dt - displaced * scene.description.gravity + virtual_mass_[b] / dt * change_[b];
         scene.world.set_external_force(id, force, actions_[b].torque);
     }
 }
@@ -124,13 +124,28 @@ Vector3d Grains::apply(fluid::Flow& flow, double dt, const Scene& scene)
             continue;
         }
         change_[b] = scene.world.velocity(bodies_[b]) - before_[b];
+        // Impulse the body got, beside contacts and weight: the force, less the inertia of the forced fluid, and what was owed to it.
         const Vector3d inertia = actions_[b].forced_mass.cwiseProduct(change_[b]);
-        owed += inertia - dt * actions_[b].force;
-        forces_[id] = actions_[b].force - (inertia - density_ * scene.bodies[id].volume * change_[b]) / dt;
+        const Vector3d got = dt * actions_[b].force + carried_[b] - inertia;
+        // The fluid got a little more or less than its reaction (turning, and arms of the faces that moved, are no part of M_w dU).
+        // The rest is in transit: the body gets it in the next step.
+        const Vector3d before = carried_[b];
+        carried_[b] = scene.world.motion(bodies_[b]) == dem::Motion::free ? Vector3d(before - got - immersed_.impulses()[b]) : Vector3d(Vector3d::Zero());
+        owed += scene.world.motion(bodies_[b]) == dem::Motion::free ? Vector3d(before - carried_[b] - got) : immersed_.impulses()[b];
+        forces_[id] = (got + density_ * scene.bodies[id].volume * change_[b]) / dt;
         torques_[id] = actions_[b].torque;
     }
-    if (actions_.size() > bodies_.size()) owed -= dt * actions_.back().force;
+    // Faces that the plate shares with a moving grain take part of its motion: the plate stands still and takes whatever that needs.
+    if (immersed_.size() > bodies_.size()) owed += immersed_.impulses().back();
     return owed;
+}
+
+void Grains::restore(std::array<std::vector<Vector3d>, 4> state)
+{
+    change_ = std::move(state[0]);
+    carried_ = std::move(state[1]);
+    forces_ = std::move(state[2]);
+    torques_ = std::move(state[3]);
 }
 
 double Grains::max_speed(const Scene& scene) const

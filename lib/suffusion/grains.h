@@ -2,6 +2,7 @@
 /// \file suffusion/grains.h
 /// Resolved grains and the filter plate in the flow: poses and velocities from the contact world, forces back to it.
 #include <Eigen/Core>
+#include <array>
 #include <vector>
 
 #include "fluid/immersed.h"
@@ -18,8 +19,8 @@ public:
     void place(const Scene& scene);
     /// Hydrodynamic forces from the provisional velocity, given to the world with buoyancy and the inertia of the forced fluid.
     void measure(fluid::Flow& flow, double dt, Scene& scene);
-    /// Forces the provisional velocity to the new motion; returns the impulse that bodies and plate owe the fluid [N s], counted on their side:
-    ///     sum_b (M_w dU + I-part) - dt F_h       [flow notes, eq. 7 and 10]
+    /// Forces the provisional velocity to the new motion; returns the impulse that bodies and plate gave the fluid [N s], counted on their
+    /// side:  sum_b M_w dU - dt F_h and what is in transit      [flow notes, eq. 7 and 10]
     Eigen::Vector3d apply(fluid::Flow& flow, double dt, const Scene& scene);
 
     /// Force on each resolved body over the last step, hydrostatic buoyancy left out [N]; zero for others. Indexed by body of the world.
@@ -32,9 +33,9 @@ public:
     /// Greatest speed of a point of a resolved body [m/s].
     double max_speed(const Scene& scene) const;
 
-    std::vector<Eigen::Vector3d> last_change() const { return change_; }
-    void set_last_change(std::vector<Eigen::Vector3d> change) { change_ = std::move(change); }
-    void restore_forces(std::vector<Eigen::Vector3d> forces, std::vector<Eigen::Vector3d> torques) { forces_ = std::move(forces), torques_ = std::move(torques); }
+    /// For a checkpoint: changes of velocity, impulses in transit, forces, torques.
+    std::array<std::vector<Eigen::Vector3d>, 4> state() const { return {change_, carried_, forces_, torques_}; }
+    void restore(std::array<std::vector<Eigen::Vector3d>, 4> state);
 
 private:
     fluid::RigidMotion motion_of(const Scene& scene, int body) const;
@@ -50,6 +51,7 @@ private:
     std::vector<double> virtual_mass_;     ///< c_v m_f of light grains [kg]
     std::vector<Eigen::Vector3d> before_;  ///< velocities at the start of the step
     std::vector<Eigen::Vector3d> change_;  ///< of the velocity over the last step
+    std::vector<Eigen::Vector3d> carried_; ///< impulse that the fluid gave up and the body gets in the next step [N s]
     std::vector<Eigen::Vector3d> forces_, torques_;
 };
 

@@ -145,7 +145,7 @@ void Simulation::flow_step(double event)
     }
     last_step_ = dt;
     time_ = dt >= (event - time_) * (1 - 1e-12) ? event : time_ + dt;
-    book_balance(dt, owed);
+    book_balance(owed);
     sort_out_leavers();
     const Stopwatch watch(timing_.grains);
     grains_->place(*scene_);
@@ -213,7 +213,7 @@ void Simulation::sort_out_leavers()
 }
 
 /// Closes the balance of the step over both phases: the fluid's own account of every impulse, against what the bodies say they got.
-void Simulation::book_balance(double, const Vector3d& owed)
+void Simulation::book_balance(const Vector3d& owed)
 {
     const fluid::MomentumTally& tally = flow_->momentum();
     balance_.mass = std::max(balance_.mass, flow_->mass().relative_error());
@@ -263,7 +263,7 @@ std::vector<std::uint8_t> Simulation::save() const
         poses.insert(poses.end(), m.orientation.coeffs().data(), m.orientation.coeffs().data() + 4);
     }
     out.array<double>(poses);
-    out.vectors(grains_->last_change()), out.vectors(grains_->forces()), out.vectors(grains_->torques());
+    for (const std::vector<Vector3d>& part : grains_->state()) out.vectors(part);
     out.vectors(fines_->forces()), out.vectors(fines_->other_acceleration());
     return out.bytes();
 }
@@ -297,10 +297,10 @@ void Simulation::restore(std::span<const std::uint8_t> state)
     }
     if (motions.size() != grains_->immersed().size()) throw Error("checkpoint.h5", "is of another case: other resolved grains", "run without --resume");
     grains_->immersed().restore(motions);
-    grains_->set_last_change(in.vectors());
-    std::vector<Vector3d> forces = in.vectors(), torques = in.vectors();
-    grains_->restore_forces(std::move(forces), std::move(torques));
-    forces = in.vectors();
+    std::array<std::vector<Vector3d>, 4> grains;
+    for (std::vector<Vector3d>& part : grains) part = in.vectors();
+    grains_->restore(std::move(grains));
+    std::vector<Vector3d> forces = in.vectors();
     fines_->restore(std::move(forces), in.vectors());
 }
 

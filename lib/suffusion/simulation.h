@@ -71,7 +71,7 @@ private:
     void sort_out_leavers();
     void check_inlet() const;
     void check_motion() const;
-    void book_balance(double dt, const Eigen::Vector3d& owed);
+    void book_balance(const Eigen::Vector3d& owed);
 
     std::unique_ptr<Scene> scene_;
     std::optional<fluid::Flow> flow_;
