@@ -97,7 +97,8 @@ struct NodeList {
 /// a little faster than the way.
 constexpr double free_path = 0.4;
 
-constexpr std::size_t row_grain = 256, entry_grain = 512, grid_grain = 256, node_grain = 4;
+// Large enough that a small world runs in one block, without threads.
+constexpr std::size_t row_grain = 1024, entry_grain = 2048, grid_grain = 512, node_grain = 8;
 
 struct World::Impl {
     WorldOptions options;
