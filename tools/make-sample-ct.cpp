@@ -1,6 +1,6 @@
 /// make-sample-ct: a CT stack of random coral-like grains with the truth beside it.
-#include <filesystem>
 #include <fmt/format.h>
+#include <filesystem>
 
 #include "cli.h"
 #include "core/error.h"
@@ -25,28 +25,51 @@ void declare(CLI::App& app, Options& o)
     app.add_option("-o,--output", o.output, "Stack, multi-page TIFF with ImageJ's calibration")->required();
     app.add_option("--truth", o.truth, "CSV of the true figures, one row a grain, SI");
     app.add_option("--grains", s.grains, "Number of grains")->capture_default_str()->check(CLI::Range(1, 65535));
-    app.add_option("--sticks", s.sticks, "How many of them are sticks")->capture_default_str()->check(CLI::NonNegativeNumber);
-    add_quantity(app, "--diameter", s.diameter, Dimension::length, "Mean equivalent diameter of the grains, voids filled");
+    app.add_option("--sticks", s.sticks, "How many of them are sticks")
+        ->capture_default_str()
+        ->check(CLI::NonNegativeNumber);
+    add_quantity(app, "--diameter", s.diameter, Dimension::length,
+                 "Mean equivalent diameter of the grains, voids filled");
     add_quantity(app, "--spread", s.spread, Dimension::number, "Diameters are uniform in diameter*(1 +- spread)");
     add_quantity(app, "--voxel-size", o.voxel_size, Dimension::length, "Edge of a voxel");
-    add_quantity(app, "--slice-spacing", o.slice_spacing, Dimension::length, "Distance of slices; 0: as the voxel size");
-    app.add_option("--degree", s.degree, "Spherical-harmonic degree of the outlines")->capture_default_str()->check(CLI::Range(2, 40));
+    add_quantity(app, "--slice-spacing", o.slice_spacing, Dimension::length,
+                 "Distance of slices; 0: as the voxel size");
+    app.add_option("--degree", s.degree, "Spherical-harmonic degree of the outlines")
+        ->capture_default_str()
+        ->check(CLI::Range(2, 40));
     add_quantity(app, "--porosity", s.voids.porosity, Dimension::number, "Intraparticle porosity; 0: solid grains");
     app.add_flag("!--no-sponge", s.voids.sponge, "Only chambers and channels; the porosity is what they give");
-    add_quantity(app, "--wavelength", s.voids.wavelength, Dimension::number, "One void and one wall of the sponge / diameter");
-    app.add_option("--compartments", s.voids.compartments, "Parts of a grain divided by septa")->capture_default_str()->check(CLI::Range(1, 1000));
-    add_quantity(app, "--open", s.voids.open_share, Dimension::number, "Share of the compartments that are open to the outside");
+    add_quantity(app, "--wavelength", s.voids.wavelength, Dimension::number,
+                 "One void and one wall of the sponge / diameter");
+    app.add_option("--compartments", s.voids.compartments, "Parts of a grain divided by septa")
+        ->capture_default_str()
+        ->check(CLI::Range(1, 1000));
+    add_quantity(app, "--open", s.voids.open_share, Dimension::number,
+                 "Share of the compartments that are open to the outside");
     add_quantity(app, "--wall", s.voids.wall, Dimension::number, "Least thickness of skin and septa / diameter");
-    app.add_option("--chambers", s.voids.chambers, "Sealed spheres in a grain")->capture_default_str()->check(CLI::Range(0, 1000));
-    app.add_option("--channels", s.voids.channels, "Cylinders from the outside to a blind ball in a grain")->capture_default_str()->check(CLI::Range(0, 1000));
-    app.add_option("--chamber-radius", s.voids.chamber_radius, "Smallest and largest / diameter")->expected(2)->capture_default_str();
-    app.add_option("--channel-radius", s.voids.channel_radius, "Smallest and largest / diameter")->expected(2)->capture_default_str();
-    app.add_option("--gap", s.gap, "Voxels between the boxes of grains and around them")->capture_default_str()->check(CLI::Range(1, 1000));
+    app.add_option("--chambers", s.voids.chambers, "Sealed spheres in a grain")
+        ->capture_default_str()
+        ->check(CLI::Range(0, 1000));
+    app.add_option("--channels", s.voids.channels, "Cylinders from the outside to a blind ball in a grain")
+        ->capture_default_str()
+        ->check(CLI::Range(0, 1000));
+    app.add_option("--chamber-radius", s.voids.chamber_radius, "Smallest and largest / diameter")
+        ->capture_default_str();
+    app.add_option("--channel-radius", s.voids.channel_radius, "Smallest and largest / diameter")
+        ->capture_default_str();
+    app.add_option("--gap", s.gap, "Voxels between the boxes of grains and around them")
+        ->capture_default_str()
+        ->check(CLI::Range(1, 1000));
     app.add_flag("--touching", s.touching, "Slide the grains together until they touch");
     auto* binary = app.add_flag("--binary", o.is_binary, "Write solid 255, void 0 instead of labels");
-    app.add_flag("--grey", o.is_grey, "Write grey values with partial volume and noise instead of labels")->excludes(binary);
-    app.add_option("--noise", o.grey.noise, "Standard deviation of the grey values")->capture_default_str()->check(CLI::NonNegativeNumber);
-    app.add_option("--supersample", s.supersample, "Points per voxel and axis on which the truth is counted; odd")->capture_default_str()->check(CLI::Range(1, 9));
+    app.add_flag("--grey", o.is_grey, "Write grey values with partial volume and noise instead of labels")
+        ->excludes(binary);
+    app.add_option("--noise", o.grey.noise, "Standard deviation of the grey values")
+        ->capture_default_str()
+        ->check(CLI::NonNegativeNumber);
+    app.add_option("--supersample", s.supersample, "Points per voxel and axis on which the truth is counted; odd")
+        ->capture_default_str()
+        ->check(CLI::Range(1, 9));
 }
 
 void check(const Options& o)
@@ -86,18 +109,20 @@ void run(Options& o, const cli::Context& context, std::uint64_t seed)
     json["size"] = {stack.size.x(), stack.size.y(), stack.size.z()};
     json["voxel_size"] = {spec.voxel_size.x(), spec.voxel_size.y(), spec.voxel_size.z()};
     double solid = 0, apparent = 0;
-    std::string rows = fmt::format("{} x {} x {} voxels of {}\nlabel kind   diameter    sphericity porosity closed voids\n", stack.size.x(),
-                                   stack.size.y(), stack.size.z(), format_quantity(o.voxel_size, Dimension::length));
+    std::string rows =
+        fmt::format("{} x {} x {} voxels of {}\nlabel kind   diameter    sphericity porosity closed voids\n",
+                    stack.size.x(), stack.size.y(), stack.size.z(), format_quantity(o.voxel_size, Dimension::length));
     for (std::size_t n = 0; n < sample.grains.size(); ++n) {
         const phantom::Truth& t = sample.grains[n].truth;
         solid += t.volume;
         apparent += t.apparent_volume;
-        rows += fmt::format("{:5} {:5} {:7.3f} mm {:13.3f} {:8.3f} {:6.3f} {:5}\n", n + 1, sample.grains[n].stick ? "stick" : "lump",
-                            1e3 * t.equivalent_diameter, t.sphericity, t.intraparticle_porosity,
-                            t.closed_void_volume / t.apparent_volume, t.void_count);
+        rows += fmt::format("{:5} {:5} {:7.3f} mm {:13.3f} {:8.3f} {:6.3f} {:5}\n", n + 1,
+                            sample.grains[n].stick ? "stick" : "lump", 1e3 * t.equivalent_diameter, t.sphericity,
+                            t.intraparticle_porosity, t.closed_void_volume / t.apparent_volume, t.void_count);
     }
     json["intraparticle_porosity"] = 1 - solid / apparent;
-    cli::print_summary(context, json, rows + fmt::format("intraparticle porosity of all: {:.3f}\n", 1 - solid / apparent));
+    cli::print_summary(context, json,
+                       rows + fmt::format("intraparticle porosity of all: {:.3f}\n", 1 - solid / apparent));
 }
 }  // namespace
 
@@ -107,5 +132,6 @@ int main(int argc, char** argv)
     std::uint64_t seed = 1;
     return cli::run_tool(
         argc, argv, "make-sample-ct", "CT stack of random coral-like grains whose true figures are known",
-        [&](CLI::App& app) { declare(app, options); }, [&](const cli::Context& context) { run(options, context, seed); }, &seed);
+        [&](CLI::App& app) { declare(app, options); },
+        [&](const cli::Context& context) { run(options, context, seed); }, &seed);
 }

@@ -2,8 +2,8 @@
 
 namespace coral::phantom {
 
-std::vector<std::size_t> label_pieces(std::span<const std::uint8_t> state, std::uint8_t wanted, const Eigen::Vector3i& size,
-                                      bool corners, std::vector<std::int32_t>& piece)
+std::vector<std::size_t> label_pieces(std::span<const std::uint8_t> state, std::uint8_t wanted,
+                                      const Eigen::Vector3i& size, bool corners, std::vector<std::int32_t>& piece)
 {
     std::vector<Eigen::Vector3i> neighbours;
     for (int dz = -1; dz <= 1; ++dz) {

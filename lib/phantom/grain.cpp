@@ -57,8 +57,8 @@ void drop_islands(std::vector<std::uint8_t>& state, const Eigen::Vector3i& size)
 }
 
 /// Void pieces: open when a point of theirs has a neighbour outside the outline.
-void count_voids(const std::vector<std::uint8_t>& state, const Eigen::Vector3i& size, double point_volume, std::size_t least_points,
-                 Truth& truth)
+void count_voids(const std::vector<std::uint8_t>& state, const Eigen::Vector3i& size, double point_volume,
+                 std::size_t least_points, Truth& truth)
 {
     std::vector<std::int32_t> piece;
     const auto counts = label_pieces(state, empty, size, false, piece);
@@ -117,14 +117,16 @@ GrainImage Grain::image(const Eigen::Vector3d& voxel_size, int supersample) cons
         for (int j = 0; j < lattice.size.y(); ++j) {
             for (int i = 0; i < lattice.size.x(); ++i, ++n) {
                 if (state[n] == outside) continue;
-                const std::size_t voxel = (static_cast<std::size_t>(k / supersample) * result.size.y() + j / supersample) *
-                                              result.size.x() + i / supersample;
+                const std::size_t voxel =
+                    (static_cast<std::size_t>(k / supersample) * result.size.y() + j / supersample) * result.size.x() +
+                    i / supersample;
                 result.apparent[voxel] = 1;
                 if (state[n] != solid) continue;
                 ++solid_points;
                 first_moment += Eigen::Vector3d(i + 0.5, j + 0.5, k + 0.5);
                 result.fraction[voxel] += static_cast<float>(1 / points_per_voxel);
-                if (i % supersample == middle && j % supersample == middle && k % supersample == middle) result.solid[voxel] = 1;
+                if (i % supersample == middle && j % supersample == middle && k % supersample == middle)
+                    result.solid[voxel] = 1;
             }
         }
     }

@@ -1,8 +1,8 @@
 #include "phantom/outline.h"
 
+#include <fmt/format.h>
 #include <algorithm>
 #include <cmath>
-#include <fmt/format.h>
 #include <numbers>
 
 #include "core/error.h"
@@ -17,9 +17,13 @@ constexpr int table_rows = 256, table_columns = 512;
 constexpr double smallest_relative_radius = 0.35;
 using std::numbers::pi;
 
-double sphericity_of(double volume, double area) { return std::cbrt(36 * pi * volume * volume) / area; }
+double sphericity_of(double volume, double area)
+{
+    return std::cbrt(36 * pi * volume * volume) / area;
+}
 
-/// Volume and area of R = 1 + height * bumps, stretched along z, from the bumps and their gradients at quadrature nodes.
+/// Volume and area of R = 1 + height * bumps, stretched along z, from the bumps and their gradients at quadrature
+/// nodes.
 struct Bumps {
     sh::SphereQuadrature nodes;
     std::vector<double> values;
@@ -30,7 +34,8 @@ struct Bumps {
     Eigen::Vector3d measure(double height) const
     {
         double volume = 0, area = 0, smallest = 1e300;
-        const Eigen::Vector3d cofactor(stretch, stretch, 1);  // det(S) S^-1: how S = diag(1, 1, stretch) maps area vectors
+        const Eigen::Vector3d cofactor(stretch, stretch,
+                                       1);  // det(S) S^-1: how S = diag(1, 1, stretch) maps area vectors
         for (std::size_t i = 0; i < values.size(); ++i) {
             const double r = 1 + height * values[i];
             const Eigen::Vector3d area_vector = r * (r * nodes.directions[i] - height * gradients[i]);
@@ -47,7 +52,8 @@ Bumps draw_bumps(const OutlineSpec& spec, RandomSource& random, std::vector<doub
     const sh::Basis basis(spec.degree);
     coefficients.assign(sh::coefficient_count(spec.degree), 0.0);
     for (int l = 2; l <= spec.degree; ++l) {  // l = 1 would only move the grain
-        for (int m = -l; m <= l; ++m) coefficients[sh::coefficient_index(l, m)] = std::pow(l, -spec.decay) * random.normal();
+        for (int m = -l; m <= l; ++m)
+            coefficients[sh::coefficient_index(l, m)] = std::pow(l, -spec.decay) * random.normal();
     }
     // R^3 has degree 3 L, for which 5 (L + 1) polar nodes are more than exact; the area integrand is smooth.
     Bumps bumps{sh::sphere_quadrature(5 * (spec.degree + 1), 10 * (spec.degree + 1)), {}, {}, spec.stretch};
@@ -100,14 +106,21 @@ Outline::Outline(const OutlineSpec& spec, RandomSource& random) : degree_(spec.d
         tabulate();
         return;
     }
-    throw Error("--sphericity", fmt::format("no outline of degree {} and stretch {} with sphericity {:.3f} in {} draws", spec.degree,
-                                            spec.stretch, spec.sphericity, draws),
+    throw Error("--sphericity",
+                fmt::format("no outline of degree {} and stretch {} with sphericity {:.3f} in {} draws", spec.degree,
+                            spec.stretch, spec.sphericity, draws),
                 "choose 0.80 to 0.95 for lumps, 0.70 to 0.85 for sticks");
 }
 
-double Outline::sphericity() const { return sphericity_of(volume_, area_); }
+double Outline::sphericity() const
+{
+    return sphericity_of(volume_, area_);
+}
 
-double Outline::equivalent_diameter() const { return std::cbrt(6 * volume_ / pi); }
+double Outline::equivalent_diameter() const
+{
+    return std::cbrt(6 * volume_ / pi);
+}
 
 void Outline::tabulate()
 {
@@ -119,7 +132,8 @@ void Outline::tabulate()
             const double theta = static_cast<double>(i) * pi / table_rows;
             for (int j = 0; j <= table_columns; ++j) {
                 const double phi = 2 * pi * j / table_columns;
-                const Eigen::Vector3d u(std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi), std::cos(theta));
+                const Eigen::Vector3d u(std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi),
+                                        std::cos(theta));
                 Eigen::Vector3d gradient;
                 const double r = basis.sum(coefficients_, u, gradient);
                 const Eigen::Vector3d point = r * Eigen::Vector3d(u.x(), u.y(), stretch_ * u.z());
@@ -146,12 +160,14 @@ double Outline::depth(const Eigen::Vector3d& point) const
 
     double phi = std::atan2(q.y(), q.x());
     if (phi < 0) phi += 2 * pi;
-    const double row = std::acos(std::clamp(q.z() / radius, -1.0, 1.0)) * (table_rows / pi), column = phi * (table_columns / (2 * pi));
-    const int i = std::min(static_cast<int>(row), table_rows - 1), j = std::min(static_cast<int>(column), table_columns - 1);
+    const double row = std::acos(std::clamp(q.z() / radius, -1.0, 1.0)) * (table_rows / pi),
+                 column = phi * (table_columns / (2 * pi));
+    const int i = std::min(static_cast<int>(row), table_rows - 1),
+              j = std::min(static_cast<int>(column), table_columns - 1);
     const float a = static_cast<float>(row - i), b = static_cast<float>(column - j);
     const Eigen::Vector2f* at = table_.data() + static_cast<std::size_t>(i) * (table_columns + 1) + j;
-    const Eigen::Vector2f value = (1 - a) * ((1 - b) * at[0] + b * at[1]) +
-                                  a * ((1 - b) * at[table_columns + 1] + b * at[table_columns + 2]);
+    const Eigen::Vector2f value =
+        (1 - a) * ((1 - b) * at[0] + b * at[1]) + a * ((1 - b) * at[table_columns + 1] + b * at[table_columns + 2]);
     return from_origin * (value[0] / radius - 1) * value[1];
 }
 
@@ -162,7 +178,8 @@ std::vector<Eigen::Vector3d> Outline::surface_points() const
     for (int i = 0; i <= table_rows; i += stride) {
         for (int j = 0; j < table_columns; j += stride) {
             const double theta = i * pi / table_rows, phi = 2 * pi * j / table_columns;
-            const Eigen::Vector3d u(std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi), stretch_ * std::cos(theta));
+            const Eigen::Vector3d u(std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi),
+                                    stretch_ * std::cos(theta));
             points.push_back(table_[static_cast<std::size_t>(i) * (table_columns + 1) + j][0] * u);
         }
     }

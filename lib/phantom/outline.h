@@ -24,10 +24,10 @@ public:
     /// \throws Error when no surface with R > 0.35 mean(R) of that sphericity is found
     Outline(const OutlineSpec& spec, RandomSource& random);
 
-    double volume() const { return volume_; }            ///< enclosed [m^3]; exact (Gauss-Legendre of enough nodes)
-    double area() const { return area_; }                ///< [m^2]; quadrature, converged to about 1e-6
-    double sphericity() const;                           ///< Wadell: area of the equal-volume sphere / area
-    double equivalent_diameter() const;                  ///< [m]
+    double volume() const { return volume_; }              ///< enclosed [m^3]; exact (Gauss-Legendre of enough nodes)
+    double area() const { return area_; }                  ///< [m^2]; quadrature, converged to about 1e-6
+    double sphericity() const;                             ///< Wadell: area of the equal-volume sphere / area
+    double equivalent_diameter() const;                    ///< [m]
     double inner_radius() const { return inner_radius_; }  ///< ball around the origin inside the surface [m]
     double outer_radius() const { return outer_radius_; }  ///< ball around the origin that holds the surface [m]
     /// Coefficients c_lm at l(l+1)+m in the convention of sh/basis.h [m].

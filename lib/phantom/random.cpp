@@ -19,9 +19,15 @@ std::uint64_t scramble(std::uint64_t seed, std::uint64_t stream)
 
 RandomSource::RandomSource(std::uint64_t seed, std::uint64_t stream) : engine_(scramble(seed, stream)) {}
 
-double RandomSource::uniform() { return static_cast<double>(engine_() >> 11) * 0x1.0p-53; }
+double RandomSource::uniform()
+{
+    return static_cast<double>(engine_() >> 11) * 0x1.0p-53;
+}
 
-double RandomSource::uniform(double low, double high) { return low + (high - low) * uniform(); }
+double RandomSource::uniform(double low, double high)
+{
+    return low + (high - low) * uniform();
+}
 
 double RandomSource::normal()
 {

@@ -83,7 +83,8 @@ std::vector<Vector3i> place(const std::vector<GrainImage>& images, int gap, bool
     std::vector<Vector3i> corners;
     for (int n = 0; n < count; ++n) {
         const Vector3i at(n % slots.x(), (n / slots.x()) % slots.y(), n / (slots.x() * slots.y()));
-        Vector3i corner = at.cwiseProduct(slot + Vector3i::Constant(gap)) + Vector3i::Constant(gap) + (slot - images[n].size) / 2;
+        Vector3i corner =
+            at.cwiseProduct(slot + Vector3i::Constant(gap)) + Vector3i::Constant(gap) + (slot - images[n].size) / 2;
         if (touching) {
             // Slide towards the grains already placed: along x within a row, y between rows, z between layers.
             for (int axis = 0; axis < 3; ++axis) {
@@ -117,7 +118,8 @@ std::string joined(const std::vector<double>& values)
 Sample make_sample(const SampleSpec& spec)
 {
     if (spec.supersample < 1 || spec.supersample % 2 == 0) {
-        throw UsageError("--supersample", to_text(spec.supersample) + " is not odd", "use 1, 3 or 5: a voxel takes the value at its centre");
+        throw UsageError("--supersample", to_text(spec.supersample) + " is not odd",
+                         "use 1, 3 or 5: a voxel takes the value at its centre");
     }
     Progress progress("grains", spec.grains);
     std::vector<GrainImage> images;
@@ -157,17 +159,33 @@ Sample make_sample(const SampleSpec& spec)
 Table truth_table(const Sample& sample)
 {
     Table table;
-    table.columns = {"label", "kind", "volume", "apparent_volume", "equivalent_diameter", "surface_area", "sphericity",
-                     "intraparticle_porosity", "open_void_volume", "closed_void_volume", "void_count", "open_void_count",
-                     "closed_void_count", "throat_diameters", "chamber_radii", "x", "y", "z"};
+    table.columns = {"label",
+                     "kind",
+                     "volume",
+                     "apparent_volume",
+                     "equivalent_diameter",
+                     "surface_area",
+                     "sphericity",
+                     "intraparticle_porosity",
+                     "open_void_volume",
+                     "closed_void_volume",
+                     "void_count",
+                     "open_void_count",
+                     "closed_void_count",
+                     "throat_diameters",
+                     "chamber_radii",
+                     "x",
+                     "y",
+                     "z"};
     for (std::size_t n = 0; n < sample.grains.size(); ++n) {
         const PlacedGrain& grain = sample.grains[n];
         const Truth& t = grain.truth;
         const auto count = [](int value) { return static_cast<long long>(value); };
-        table.add({count(static_cast<int>(n) + 1), std::string(grain.stick ? "stick" : "lump"), t.volume, t.apparent_volume,
-                   t.equivalent_diameter, t.surface_area, t.sphericity, t.intraparticle_porosity, t.open_void_volume,
-                   t.closed_void_volume, count(t.void_count), count(t.open_void_count), count(t.closed_void_count),
-                   joined(t.throat_diameters), joined(t.chamber_radii), grain.centre.x(), grain.centre.y(), grain.centre.z()});
+        table.add({count(static_cast<int>(n) + 1), std::string(grain.stick ? "stick" : "lump"), t.volume,
+                   t.apparent_volume, t.equivalent_diameter, t.surface_area, t.sphericity, t.intraparticle_porosity,
+                   t.open_void_volume, t.closed_void_volume, count(t.void_count), count(t.open_void_count),
+                   count(t.closed_void_count), joined(t.throat_diameters), joined(t.chamber_radii), grain.centre.x(),
+                   grain.centre.y(), grain.centre.z()});
     }
     return table;
 }
@@ -186,7 +204,8 @@ morph::VoxelStack grey_stack(const Sample& sample, const GreySpec& spec, std::ui
     parallel_blocks(stack.count(), slice, [&](std::size_t begin, std::size_t end) {
         RandomSource random(seed, 1'000'000 + begin / slice);  // a stream per slice, away from those of the grains
         for (std::size_t n = begin; n < end; ++n) {
-            const double grey = spec.void_grey + (spec.solid_grey - spec.void_grey) * sample.fraction[n] + spec.noise * random.normal();
+            const double grey =
+                spec.void_grey + (spec.solid_grey - spec.void_grey) * sample.fraction[n] + spec.noise * random.normal();
             stack.values[n] = static_cast<std::uint32_t>(std::clamp(std::lround(grey), 0L, 255L));
         }
     });

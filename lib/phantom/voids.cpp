@@ -1,8 +1,8 @@
 #include "phantom/voids.h"
 
+#include <fmt/format.h>
 #include <algorithm>
 #include <cmath>
-#include <fmt/format.h>
 #include <limits>
 #include <numbers>
 
@@ -91,8 +91,9 @@ void Voids::place_channels(const VoidSpec& spec, RandomSource& random)
     for (int n = 0; n < spec.channels; ++n) {
         double throat = d * random.uniform(spec.channel_radius[0], spec.channel_radius[1]);
         for (int attempt = 0;; ++attempt) {
-            if (attempt == placing_tries) throw UsageError("--channels", fmt::format("no room for {} channels", spec.channels),
-                                                           "ask for fewer or smaller ones");
+            if (attempt == placing_tries)
+                throw UsageError("--channels", fmt::format("no room for {} channels", spec.channels),
+                                 "ask for fewer or smaller ones");
             if (attempt > 0 && attempt % 50 == 0) throat *= 0.9;  // a stick has room for thinner channels only
             const double ball = throat * random.uniform(1.3, 1.8);
             const Eigen::Vector3d centre = random_point_inside(outline_, random);
@@ -120,8 +121,9 @@ void Voids::place_chambers(const VoidSpec& spec, RandomSource& random)
     for (int n = 0; n < spec.chambers; ++n) {
         double radius = d * random.uniform(spec.chamber_radius[0], spec.chamber_radius[1]);
         for (int attempt = 0;; ++attempt) {
-            if (attempt == placing_tries) throw UsageError("--chambers", fmt::format("no room for {} chambers", spec.chambers),
-                                                           "ask for fewer or smaller ones");
+            if (attempt == placing_tries)
+                throw UsageError("--chambers", fmt::format("no room for {} chambers", spec.chambers),
+                                 "ask for fewer or smaller ones");
             if (attempt > 0 && attempt % 50 == 0) radius *= 0.9;
             const Eigen::Vector3d centre = random_point_inside(outline_, random);
             if (!has_room(centre, radius)) continue;
@@ -159,7 +161,8 @@ Voids::Kind Voids::classify(const Eigen::Vector3d& point, double depth) const
     return Kind::sponge;
 }
 
-/// Level of the cut from the values at a fixed lattice of grain axes: the geometry does not depend on the voxels of the image.
+/// Level of the cut from the values at a fixed lattice of grain axes: the geometry does not depend on the voxels of the
+/// image.
 void Voids::choose_level(double porosity)
 {
     constexpr int points = 72;
@@ -191,7 +194,8 @@ void Voids::choose_level(double porosity)
                          "raise it, or ask for fewer or smaller ones");
     }
     if (wanted > 0.8 * static_cast<double>(sponge.size())) {
-        throw UsageError("--porosity", fmt::format("walls leave room for {:.2f} only", (0.8 * sponge.size() + empty) / inside),
+        throw UsageError("--porosity",
+                         fmt::format("walls leave room for {:.2f} only", (0.8 * sponge.size() + empty) / inside),
                          "lower it, or ask for thinner walls or fewer compartments");
     }
     const auto nth = sponge.begin() + static_cast<std::ptrdiff_t>(wanted);

@@ -1,8 +1,9 @@
 #pragma once
 /// \file phantom/voids.h
-/// Voids inside a grain, after the skeleton of a coral: compartments divided by septa, each a sponge (level cut of a Gaussian
-/// random field) that is either sealed by a skin or open to the outside; sealed chambers (spheres); and channels (a straight
-/// cylinder from the outside to a blind ball) whose throat is known. Chambers and channels keep a wall of solid around them.
+/// Voids inside a grain, after the skeleton of a coral: compartments divided by septa, each a sponge (level cut of a
+/// Gaussian random field) that is either sealed by a skin or open to the outside; sealed chambers (spheres); and
+/// channels (a straight cylinder from the outside to a blind ball) whose throat is known. Chambers and channels keep a
+/// wall of solid around them.
 #include <Eigen/Core>
 #include <array>
 #include <vector>
@@ -14,12 +15,12 @@ namespace coral::phantom {
 
 /// Lengths relative to the equivalent diameter of the grain.
 struct VoidSpec {
-    double porosity = 0.3;       ///< voids / apparent volume; 0 leaves the grain solid
-    bool sponge = true;          ///< false: only chambers and channels, and the porosity is what they give
-    double wavelength = 0.25;    ///< of the sponge: one void and one wall
+    double porosity = 0.3;     ///< voids / apparent volume; 0 leaves the grain solid
+    bool sponge = true;        ///< false: only chambers and channels, and the porosity is what they give
+    double wavelength = 0.25;  ///< of the sponge: one void and one wall
     int compartments = 5;
-    double open_share = 0.5;     ///< share of the compartments that are open to the outside
-    double wall = 0.05;          ///< least thickness of skin, septa, and walls around chambers and channels
+    double open_share = 0.5;  ///< share of the compartments that are open to the outside
+    double wall = 0.05;       ///< least thickness of skin, septa, and walls around chambers and channels
     int chambers = 1, channels = 1;
     std::array<double, 2> chamber_radius{0.06, 0.10};  ///< smallest, largest
     std::array<double, 2> channel_radius{0.06, 0.10};
@@ -38,7 +39,8 @@ struct Channel {
 
 class Voids {
 public:
-    /// \throws UsageError when chambers and channels alone exceed the porosity or the walls leave too little room for it
+    /// \throws UsageError when chambers and channels alone exceed the porosity or the walls leave too little room for
+    /// it
     Voids(const VoidSpec& spec, const Outline& outline, RandomSource& random);
 
     const std::vector<Chamber>& chambers() const { return chambers_; }
@@ -62,8 +64,8 @@ private:
 
     const Outline& outline_;
     WaveField field_;
-    double wall_;        ///< [m]
-    float level_ = 0;    ///< the sponge is void where the field is above it
+    double wall_;                         ///< [m]
+    float level_ = 0;                     ///< the sponge is void where the field is above it
     std::vector<Eigen::Vector3d> seeds_;  ///< of the compartments (Voronoi cells)
     std::vector<bool> open_;              ///< per compartment
     std::vector<Chamber> chambers_;

@@ -34,8 +34,8 @@ WaveField::OnLattice::OnLattice(const WaveField& field, const Lattice& lattice)
             for (int n = 0; n < size_[axis]; ++n) {
                 double angle = k[axis] * (lattice.origin[axis] + n * lattice.step[axis]);
                 if (axis == 0) angle += field.phases_[m];
-                const std::size_t at = axis == 0 ? static_cast<std::size_t>(m) * size_[0] + n
-                                                 : static_cast<std::size_t>(n) * waves_ + m;
+                const std::size_t at =
+                    axis == 0 ? static_cast<std::size_t>(m) * size_[0] + n : static_cast<std::size_t>(n) * waves_ + m;
                 const double scale = axis == 0 ? amplitude : 1.0;
                 real_[axis][at] = static_cast<float>(scale * std::cos(angle));
                 imaginary_[axis][at] = static_cast<float>(scale * std::sin(angle));

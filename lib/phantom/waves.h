@@ -15,20 +15,17 @@ namespace coral::phantom {
 /// Points p = origin + x-index * step[0] e_x + ... of a lattice aligned with the axes of a rotated frame:
 /// the field is asked for at frame * p + offset.
 struct Lattice {
-    Eigen::Matrix3d frame = Eigen::Matrix3d::Identity();   ///< lattice axes -> grain axes
-    Eigen::Vector3d origin = Eigen::Vector3d::Zero();      ///< first point, lattice axes [m]
-    Eigen::Vector3d step = Eigen::Vector3d::Ones();        ///< spacing per axis [m]
-    Eigen::Vector3i size = Eigen::Vector3i::Ones();        ///< points per axis
+    Eigen::Matrix3d frame = Eigen::Matrix3d::Identity();  ///< lattice axes -> grain axes
+    Eigen::Vector3d origin = Eigen::Vector3d::Zero();     ///< first point, lattice axes [m]
+    Eigen::Vector3d step = Eigen::Vector3d::Ones();       ///< spacing per axis [m]
+    Eigen::Vector3i size = Eigen::Vector3i::Ones();       ///< points per axis
 
     /// Point in grain axes [m].
     Eigen::Vector3d point(int i, int j, int k) const
     {
         return frame * (origin + step.cwiseProduct(Eigen::Vector3d(i, j, k)));
     }
-    std::size_t index(int i, int j, int k) const
-    {
-        return (static_cast<std::size_t>(k) * size.y() + j) * size.x() + i;
-    }
+    std::size_t index(int i, int j, int k) const { return (static_cast<std::size_t>(k) * size.y() + j) * size.x() + i; }
     std::size_t count() const { return static_cast<std::size_t>(size.x()) * size.y() * size.z(); }
 };
 

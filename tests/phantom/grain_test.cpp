@@ -13,7 +13,8 @@ namespace {
 using namespace coral::phantom;
 using std::numbers::pi;
 
-GrainImage image_of(const VoidSpec& voids, double sphericity = 0.9, int across = 30, int supersample = 3, std::uint64_t stream = 0)
+GrainImage image_of(const VoidSpec& voids, double sphericity = 0.9, int across = 30, int supersample = 3,
+                    std::uint64_t stream = 0)
 {
     RandomSource random(3, stream);
     GrainSpec spec;
@@ -73,9 +74,8 @@ TEST(Grain, compartments_are_open_or_sealed_as_asked)
     EXPECT_GT(open.open_void_volume, 0.8 * (open.open_void_volume + open.closed_void_volume));
 }
 
-TEST(Grain, a_ball_passes_its_channel_when_smaller_than_the_throat_and_not_when_larger)
+TEST(Grain, channels_are_free_to_their_throat_radius_and_walled_beyond_it)
 {
-    // Brute force on the fine lattice: points farther than r from all solid, connected from the outside to the ball.
     VoidSpec voids;
     voids.porosity = 0.12;
     voids.channels = 1;

@@ -51,7 +51,8 @@ TEST(Outline, encloses_the_volume_found_by_throwing_points)
     const double r = lump.outer_radius();
     const int points = 400'000;
     int inside = 0;
-    for (int n = 0; n < points; ++n) inside += lump.contains({random.uniform(-r, r), random.uniform(-r, r), random.uniform(-r, r)});
+    for (int n = 0; n < points; ++n)
+        inside += lump.contains({random.uniform(-r, r), random.uniform(-r, r), random.uniform(-r, r)});
     const double share = double(inside) / points;
     const double deviation = std::sqrt(share * (1 - share) / points) / share;
     EXPECT_NEAR(share * 8 * r * r * r / lump.volume(), 1.0, 4 * deviation);
@@ -75,5 +76,8 @@ TEST(Outline, depth_is_the_distance_to_the_surface_near_it)
     }
 }
 
-TEST(Outline, refuses_a_sphericity_that_cannot_be_had) { EXPECT_THROW(make(0.99, 3.0), std::runtime_error); }
+TEST(Outline, refuses_a_sphericity_that_cannot_be_had)
+{
+    EXPECT_THROW(make(0.99, 3.0), std::runtime_error);
+}
 }  // namespace

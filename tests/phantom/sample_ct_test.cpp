@@ -28,7 +28,8 @@ TEST(SampleCt, labels_hold_each_grain_with_its_true_volume)
     ASSERT_EQ(volumes.size(), 4u);
     for (std::uint32_t n = 1; n <= 3; ++n) EXPECT_NEAR(volumes[n] / sample.grains[n - 1].truth.volume, 1.0, 0.02);
     // The partial volumes add up to the very figure.
-    const double solid = std::accumulate(sample.fraction.begin(), sample.fraction.end(), 0.0) * sample.labels.voxel_size.prod();
+    const double solid =
+        std::accumulate(sample.fraction.begin(), sample.fraction.end(), 0.0) * sample.labels.voxel_size.prod();
     double truth = 0;
     for (const auto& grain : sample.grains) truth += grain.truth.volume;
     EXPECT_NEAR(solid / truth, 1.0, 1e-6);
@@ -71,7 +72,8 @@ TEST(SampleCt, grains_keep_apart_unless_asked_to_touch)
         EXPECT_EQ(contacts > 0, touching);
         // Nothing lies on the border.
         for (int k = 0; k < s.size.z(); ++k) {
-            for (int j = 0; j < s.size.y(); ++j) EXPECT_EQ(s.values[s.index(0, j, k)] + s.values[s.index(s.size.x() - 1, j, k)], 0u);
+            for (int j = 0; j < s.size.y(); ++j)
+                EXPECT_EQ(s.values[s.index(0, j, k)] + s.values[s.index(s.size.x() - 1, j, k)], 0u);
         }
     }
 }

@@ -34,6 +34,17 @@ TEST(MakeSampleCt, writes_the_truth_with_one_row_a_grain)
     EXPECT_NEAR(std::get<double>(truth.rows[0][7]), 0.25, 0.01);
 }
 
+TEST(MakeSampleCt, draws_chambers_alone_in_the_range_asked_for)
+{
+    const ScratchFolder folder;
+    const std::string options = "--no-sponge --channels 0 --chambers 2 --chamber-radius 0.09 0.1";
+    const ProgramResult result = run_program(small + "-o a.tif --truth a.csv " + options, folder.path());
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+    const Table truth = read_table(folder.path() / "a.csv");
+    EXPECT_EQ(std::get<double>(truth.rows[0][10]), 2);                                     // void_count
+    EXPECT_NEAR(std::get<double>(truth.rows[0][7]), 2 * 8 * 0.095 * 0.095 * 0.095, 2.5e-3);  // porosity: (2r/d)^3 each
+}
+
 TEST(MakeSampleCt, says_what_is_wrong_and_leaves_no_file)
 {
     const ScratchFolder folder;
