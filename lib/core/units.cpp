@@ -102,9 +102,9 @@ std::string format_quantity(double value, Dimension dimension)
         if (size >= 1 - 1e-12 && (best_size < 1 - 1e-12 || size < best_size)) best = &unit;
     }
     double shown = value / best->factor;
-    // Division by a decimal factor leaves noise in the last digits (0.2 mm / 1e-3): show 12 digits.
+    // For reading: six digits, which also hides the noise of dividing by a decimal factor (0.2 mm / 1e-3).
     std::array<char, 32> buffer;
-    const auto end = std::to_chars(buffer.data(), buffer.data() + buffer.size(), shown, std::chars_format::general, 12).ptr;
+    const auto end = std::to_chars(buffer.data(), buffer.data() + buffer.size(), shown, std::chars_format::general, 6).ptr;
     std::string text(buffer.data(), end);
     if (dimension == Dimension::number) return text;
     return text + " " + std::string(best->name);
