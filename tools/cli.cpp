@@ -119,15 +119,13 @@ std::string config_file(const std::vector<std::string>& arguments)
 std::string parse_problem(const CLI::App& app, const CLI::ParseError& error, const std::vector<std::string>& arguments)
 {
     const bool extra = dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr;
-    if (extra || dynamic_cast<const CLI::RequiredError*>(&error)) {
-        const std::vector<std::string> names = long_names(app);
-        for (const std::string& argument : arguments) {
-            if (!argument.starts_with(extra ? "-" : "--") || argument == "-" || argument == "--") continue;
-            const std::string name = argument.substr(argument.find_first_not_of('-'), argument.find('=') - argument.find_first_not_of('-'));
-            if (app.get_option_no_throw(argument.starts_with("--") ? "--" + name : "-" + name.substr(0, 1))) continue;
-            const std::string hint = did_you_mean(name, names);
-            return "unknown option " + argument + "; " + (hint.empty() ? "see --help" : hint);
-        }
+    const std::vector<std::string> names = long_names(app);
+    for (const std::string& argument : arguments) {
+        if (!argument.starts_with(extra ? "-" : "--") || argument == "-" || argument == "--") continue;
+        const std::string name = argument.substr(argument.find_first_not_of('-'), argument.find('=') - argument.find_first_not_of('-'));
+        if (app.get_option_no_throw(argument.starts_with("--") ? "--" + name : "-" + name.substr(0, 1))) continue;
+        const std::string hint = did_you_mean(name, names);
+        return "unknown option " + argument + "; " + (hint.empty() ? "see --help" : hint);
     }
     std::string text = error.what();
     std::ranges::replace(text, '\n', ' ');

@@ -58,7 +58,8 @@ FloatGrid::Ptr to_vdb(const DistanceGrid& grid, const Eigen::Vector3d& origin, c
                 if (d <= -inside) values.setValueOff(at, -inside);
                 else values.setValueOn(at, d);
             }
-    openvdb::tools::pruneInactive(vdb->tree());
+    // Not pruneInactive: it would give the deep inside the value of the outside.
+    openvdb::tools::pruneLevelSet(vdb->tree(), outside, -inside);
     auto transform = openvdb::math::Transform::createLinearTransform(grid.spacing * millimetres);
     transform->postTranslate(openvdb::Vec3d(origin.x(), origin.y(), origin.z()) * millimetres);
     vdb->setTransform(transform);

@@ -51,6 +51,16 @@ void expect_same(const DistanceGrid& a, const DistanceGrid& b)
     EXPECT_NEAR(a.inside_limit, b.inside_limit, 1e-6 * a.spacing);
 }
 
+// Whole blocks of the tree lie below the band here; they must stay solid.
+TEST_F(VdbFile, keeps_the_deep_inside_of_a_large_grain_solid)
+{
+    write_grains(folder / "grains.vdb", std::vector<GrainLevelSet>{hollow_ball(1, 66)}, chain);
+    const GrainLevelSet back = read_grains(folder / "grains.vdb").grains.at(0);
+    EXPECT_LT(back.apparent.sample(Eigen::Vector3d::Zero()), 0.0);
+    EXPECT_NEAR(solid_volume(back.apparent) / back.apparent_volume, 1.0, 1e-5);
+    EXPECT_NEAR(solid_volume(back.solid) / back.volume, 1.0, 1e-5);
+}
+
 TEST_F(VdbFile, gives_grains_and_history_back)
 {
     const std::vector<GrainLevelSet> grains = {hollow_ball(2, 14), hollow_ball(1, 20)};
