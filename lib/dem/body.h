@@ -25,7 +25,7 @@ struct Material {
 };
 
 /// Damping ratio that gives the coefficient of restitution e in (0, 1] to two spheres of the linear law whose force never pulls:
-///     e = exp(-(zeta/w) (pi - atan2(2 zeta w, 1 - 2 zeta^2))), w = sqrt(1 - zeta^2)      [notes, section 7, case 2]
+///     e = exp(-(zeta/w) (pi - atan2(2 zeta w, 1 - 2 zeta^2))), w = sqrt(1 - zeta^2)      [linear spring and dashpot without tension]
 /// \throws Error  e outside (0, 1]
 double damping_of_restitution(double restitution);
 /// The e of that equation, for 0 <= zeta < 1.

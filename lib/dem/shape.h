@@ -19,7 +19,7 @@ enum class ShapeKind { sphere, grid };
 /// What a grid shape is made of; lengths at scale 1.
 struct GridShapeData {
     std::string name;  ///< for messages, such as "grains.vdb grain_3"
-    /// True distance on a dense lattice. Outside it must be exact out to the largest radius that is queried (section 4 of the notes).
+    /// True distance on a dense lattice. Outside it must be exact out to the largest radius that is queried.
     std::shared_ptr<const sdf::DistanceGrid> distance;
     std::vector<Eigen::Vector3d> nodes;  ///< surface nodes, void walls included [m]
     std::vector<double> node_areas;      ///< tributary areas; they sum to the surface [m2]

@@ -130,8 +130,7 @@ public:
     void restart_history();
     void set_body_acceleration(const Eigen::Vector3d& acceleration) { options_.body_acceleration = acceleration; }
 
-    /// Largest stable step [s]: 1.5 cfl / (12 nu/h2 + 1.5 max sum_i |u_i|/h), capped and grown slowly  [fluid-notes,
-    /// eq. 14].
+    /// Largest stable step [s]: 1.5 cfl / (12 nu/h2 + 1.5 max sum_i |u_i|/h), capped and grown slowly  [docs/numerics.md, eq. 14].
     double stable_time_step() const;
     /// Convection, viscosity, old pressure gradient, body acceleration and semi-implicit drag of the fines. \param dt
     /// [s]

@@ -199,7 +199,7 @@ Eigen::Vector3d Flow::boundary_flux_rate() const
 }
 
 /// Repairs the momentum moved by the porosity field with a uniform acceleration, then applies the drag of the fines:
-/// eps u* <- eps u* + dt (A u^n - B - A u*)   [fluid-notes, eq. 5, with A = eps K, B = eps G].
+/// eps u* <- eps u* + dt (A u^n - B - A u*)   [docs/numerics.md, eq. 5, with A = eps K, B = eps G].
 void Flow::apply_fines(double dt)
 {
     const double volume = options_.density * grid_.cell_volume();

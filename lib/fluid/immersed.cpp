@@ -251,7 +251,7 @@ void for_each_component(const Body& body)
     body(std::integral_constant<int, 2>{});
 }
 
-/// w of a face with solid fraction phi  [fluid-notes, eq. 7, 8].
+/// w of a face with solid fraction phi  [docs/numerics.md, eq. 7, 8].
 double forcing_weight(const ForcingOptions& options, double phi, double slip, double dt, double nu, double cell)
 {
     if (phi >= 1.0) return 1.0;

@@ -40,7 +40,7 @@ struct RigidMotion {
 };
 
 /// What the fluid does to a body over one step, hydrostatic buoyancy left out.
-/// The caller advances U by   (m_p + M_w - m_f) dU = dt (force + contacts + (m_p - m_f) g)   [fluid-notes, eq. 11]
+/// The caller advances U by   (m_p + M_w - m_f) dU = dt (force + contacts + (m_p - m_f) g)   [docs/numerics.md, eq. 11]
 /// and omega with I_p + I_w - I_f alike (plus virtual mass when the grain is lighter than 0.8 of the fluid).
 struct FluidAction {
     Eigen::Vector3d force = Eigen::Vector3d::Zero();           ///< [N]
@@ -73,7 +73,7 @@ public:
     /// \param motions  one per body, in the order of add(). Bodies wrap across periodic sides.
     void place(std::span<const RigidMotion> motions);
 
-    /// Force and torque from the provisional velocity, with the motions at the start of the step  [fluid-notes, eq. 10,
+    /// Force and torque from the provisional velocity, with the motions at the start of the step  [docs/numerics.md, eq. 10,
     /// 12]:
     ///     F = (rho/dt) sum_faces w eps (u* - u_s) h3
     /// Weights w [eq. 8] are kept for apply(). \returns one action per body, valid until the next call

@@ -87,7 +87,7 @@ std::size_t FineCoupling::stored_weights() const
 }
 
 /// Largest block that divides the grid and leaves 1.5 blocks per smallest diameter: the felt averages do not change
-/// [fluid-notes, section 7].
+/// [docs/numerics.md, section 7].
 void FineCoupling::choose_blocks(std::span<const double> diameters)
 {
     block_ = std::max(options_.coupling_cells, 1);

@@ -40,7 +40,7 @@ struct LevelSetReport {
 /// Signed distance of a mask, in the mask's frame, clamped to the band (limits are set accordingly).
 /// Occupancy smoothed by a Gaussian, surface points by Newton on its Catmull-Rom interpolant, nearest surface point carried
 /// outwards over the lattice and refined there; signs from the smoothed occupancy, so closed cavities stay
-/// [geometry notes, section 2]. Voxels that differ by axis are resampled to the finest edge with a cubic.
+/// [docs/numerics.md, geometry]. Voxels that differ by axis are resampled to the finest edge with a cubic.
 /// Error against true shapes: 0.11 voxel RMS. Throats under 1.5 and walls under 1 node spacing may close.
 /// \param lattice  when given, the nodes lie on the lattice of this grid (same spacing), as for an apparent twin
 /// \throws Error on an empty mask, or when `spacing` is less than half the finest voxel edge

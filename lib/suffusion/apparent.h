@@ -11,7 +11,7 @@ namespace coral::suffusion {
 
 /// Void region of one shape, on a lattice of its frame.
 /// Apparent shape: ball-reachable closing. With E the points farther than R from the solid and connected to the outside, a point
-/// is inside when its distance to E exceeds R (half a spacing of tolerance)      [geometry notes, scheme B; R = 0.1 d]
+/// is inside when its distance to E exceeds R (half a spacing of tolerance)      [docs/numerics.md, geometry; R = 0.1 d]
 class ApparentShape {
 public:
     /// \param diameter  equivalent diameter of the apparent shape [m]

@@ -9,7 +9,7 @@ using Eigen::Vector3d;
 
 namespace {
 
-constexpr double light_ratio = 0.8;   ///< below this density ratio the lagged added mass needs a virtual mass [flow notes, section 6]
+constexpr double light_ratio = 0.8;   ///< below this density ratio the lagged added mass needs a virtual mass [docs/numerics.md]
 constexpr double virtual_share = 0.5; ///< c_v
 constexpr double reshape_cells = 0.02;
 

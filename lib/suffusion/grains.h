@@ -20,7 +20,7 @@ public:
     /// Hydrodynamic forces from the provisional velocity, given to the world with buoyancy and the inertia of the forced fluid.
     void measure(fluid::Flow& flow, double dt, Scene& scene);
     /// Forces the provisional velocity to the new motion; returns the impulse that bodies and plate gave the fluid [N s], counted on their
-    /// side:  sum_b M_w dU - dt F_h and what is in transit      [flow notes, eq. 7 and 10]
+    /// side:  sum_b M_w dU - dt F_h and what is in transit      [docs/numerics.md, eq. 7 and 10]
     Eigen::Vector3d apply(fluid::Flow& flow, double dt, const Scene& scene);
 
     /// Force on each resolved body over the last step, hydrostatic buoyancy left out [N]; zero for others. Indexed by body of the world.

@@ -20,7 +20,7 @@ constexpr double seconds_per_cell = 6e-8;          ///< fluid step, per cell
 constexpr double seconds_per_fine = 2e-5;          ///< kernel gather and spread, per fine and fluid step, at support 2d/4d
 constexpr double seconds_per_grain_contact = 2e-7; ///< contact step, per grain
 constexpr double bytes_per_cell = 260;
-constexpr double pore_speed_ratio = 15;            ///< max sum |u_i| / superficial velocity in a gap-graded bed [notes on flow, section 11]
+constexpr double pore_speed_ratio = 15;            ///< max sum |u_i| / superficial velocity in a gap-graded bed [measured in packed beds]
 
 PopulationPlan population_of(const pack::Sample& sample, pack::Role role, double cell)
 {
@@ -59,7 +59,7 @@ double fitting_cell(const Eigen::Vector3d& size, double wanted)
 }
 
 /// Domain: the sample, with free space above and below in the proportion of the paper (64 mm for 60 mm). The plate's faces lie a quarter of a
-/// cell off the cell faces: a plate exactly on them is the worst case of an immersed wall [notes on flow, section 2].
+/// cell off the cell faces: a plate exactly on them is the worst case of an immersed wall [measured in packed beds].
 void lay_out(Plan& plan)
 {
     const double cell = fitting_cell(plan.sample_size, plan.options.cell);

@@ -20,7 +20,7 @@ namespace coral::suffusion {
 
 namespace {
 
-constexpr int level_set_nodes = 6000, harmonics_nodes = 2500;  // notes on contact, section 3
+constexpr int level_set_nodes = 6000, harmonics_nodes = 2500;  // docs/numerics.md, contact
 
 dem::Motion motion_of(BodyMotion motion)
 {

@@ -13,7 +13,7 @@ using Eigen::Vector3d;
 
 namespace {
 
-constexpr double grain_cells = 0.1, fine_cells = 0.3;  ///< farthest move in a flow step [cells; flow notes, section 8]
+constexpr double grain_cells = 0.1, fine_cells = 0.3;  ///< farthest move in a flow step [cells; docs/numerics.md]
 constexpr int dry_substeps = 256;                      ///< contact steps between two looks at the outside
 constexpr double speed_bound = 1e3;                    ///< [m/s]: beyond it a run has blown up
 

@@ -1,7 +1,7 @@
 #pragma once
 /// \file suffusion/simulation.h
 /// One coupled run in time: flow, resolved grains, fines and contact, advanced together by one flow step.
-/// Order of a step [flow notes, section 4]: fines' felt fields and drag; predictor with semi-implicit drag; force on resolved grains
+/// Order of a step [docs/numerics.md]: fines' felt fields and drag; predictor with semi-implicit drag; force on resolved grains
 /// from the provisional velocity; contact steps with these forces; forcing with the new motions; projection.
 #include <memory>
 #include <optional>

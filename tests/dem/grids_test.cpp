@@ -1,4 +1,4 @@
-// Grid shapes: node contact, spheres on grids, rotation, energy (sdf-dem-notes sections 3 and 7).
+// Grid shapes: node contact, spheres on grids, rotation, energy.
 #include <gtest/gtest.h>
 
 #include "core/error.h"
@@ -68,7 +68,7 @@ TEST(Rotation, intermediate_axis_flips_at_the_times_of_the_elliptic_functions)
 
 TEST(NodeContact, ball_on_ball_tends_to_the_sphere_law)
 {
-    // F = kn delta u/sqrt(1+u^2) for small overlaps, u = 100 delta/d [notes, case 11].
+    // F = kn delta u/sqrt(1+u^2) for small overlaps, u = 100 delta/d.
     const double r = 5e-3;
     for (const auto& [nodes, tolerance] : {std::pair{2500, 0.10}, std::pair{24000, 0.03}}) {
         World world = quiet_world(0.0, 0.0);
@@ -253,7 +253,7 @@ TEST(SphereOnGrid, friction_makes_a_ball_roll_down_a_grid_with_momentum_kept)
 
 TEST(SphereOnGrid, linked_rings_hold_each_other)
 {
-    // Tori R 5 mm, r 1 mm, linked, pulled apart: the distance of the centres is 8 mm and the overlap [notes, case 17].
+    // Tori R 5 mm, r 1 mm, linked, pulled apart: the distance of the centres is 8 mm and the overlap.
     const double big = 5e-3, small = 1e-3;
     const auto torus = [&](int nodes) {
         GridShapeData d;
@@ -278,7 +278,7 @@ TEST(SphereOnGrid, linked_rings_hold_each_other)
     const int b = add_grid(world, shape, {7.9e-3, 0, 0}, Vec3::Zero(), Vec3::Zero(), Quat(Eigen::AngleAxisd(std::numbers::pi / 2, Vec3::UnitX())));
     world.set_external_force(b, {1.0, 0, 0}, Vec3::Zero());
     world.advance(0.03, 4e-6);
-    EXPECT_NEAR(world.position(b).x(), 8.022e-3, 0.12 * 22e-6) << "the notes give 8.021 to 8.023 for 2500 nodes and more";
+    EXPECT_NEAR(world.position(b).x(), 8.022e-3, 0.12 * 22e-6) << "expected 8.021 to 8.023 for 2500 nodes and more";
     EXPECT_NEAR(world.contacts().at(0).normal_force.norm(), 1.0, 0.02);
 }
 

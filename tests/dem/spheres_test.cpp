@@ -1,4 +1,4 @@
-// Spheres and walls against closed forms (sdf-dem-notes section 7).
+// Spheres and walls against closed forms.
 #include <gtest/gtest.h>
 
 #include "core/error.h"

@@ -279,7 +279,7 @@ double ergun_ratio(double nu, double acceleration, int cells_per_diameter, int s
 
 TEST(FineCoupling, in_a_homogeneous_bed_has_the_pressure_gradient_of_ergun)
 {
-    // gates of fluid-notes section 10: 10 % at Re 1, 12 % in the inertial regime; one cell and two cells per diameter
+    // gates: 10 % at Re 1, 12 % in the inertial regime; one cell and two cells per diameter
     const double inertial = ergun_ratio(1e-6, 2.5, 2, 250);
     const double viscous = ergun_ratio(1e-4, 0.24, 2, 300);
     RecordProperty("inertial", std::to_string(inertial));

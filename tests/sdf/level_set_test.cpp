@@ -1,4 +1,4 @@
-// Acceptance figures of the geometry notes, section 7, items 1, 2 and the hollow sphere of 7.
+// Acceptance figures: analytic bodies, sampled at and below the voxel resolution, and a hollow sphere.
 #include "sdf/level_set.h"
 
 #include <gtest/gtest.h>

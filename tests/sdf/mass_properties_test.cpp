@@ -23,7 +23,7 @@ TEST(MassProperties, of_a_sphere_are_exact_to_a_thousandth_at_nine_spacings)
 
 TEST(MassProperties, of_a_hollow_sphere_with_a_wall_of_two_and_a_half_spacings)
 {
-    // 12 mm ball, 0.5 mm wall, 200 um: the notes' example (cosine Heaviside: V +0.015 %, J +0.09 %).
+    // 12 mm ball, 0.5 mm wall, 200 um.
     const double h = 2e-4, outer = 6e-3, inner = 5.5e-3;
     const DistanceGrid grid = tabulated(shell(Eigen::Vector3d(3e-5, -6e-5, 8e-5), outer, inner), Eigen::Vector3d::Constant(-34 * h), Eigen::Vector3i::Constant(69), h);
     const MassProperties body = mass_properties(grid);

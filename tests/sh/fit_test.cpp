@@ -13,7 +13,7 @@ namespace {
 
 TEST(Fit, finds_a_body_of_degree_8_in_its_level_set)
 {
-    // Geometry notes, section 7, item 6: to 2e-3 of the radius from a level set with R = 20 h.
+    // To 2e-3 of the radius from a level set with R = 20 h.
     const Surface truth = centred(lump(8, 0.12, 7));
     const sdf::DistanceGrid grid = tabulate(truth, 0.05, 0.3);
     const RadialSamples samples = cast_rays(grid, 8);

@@ -64,7 +64,7 @@ TEST(Ls2sh, fits_every_grain_and_writes_shapes_errors_and_history)
     const Table table = read_table(folder.path() / "t.csv");
     const std::vector<std::string> columns = {"id", "degree", "method", "rms_error", "max_error", "volume_error", "area_error", "inertia_error", "non_star_fraction", "seconds"};
     EXPECT_TRUE(std::equal(columns.begin(), columns.end(), table.columns.begin()));
-    // The notes give a cube 11.6 % of the largest radius at its corners for degree 10: 0.116 * 0.866 / 1.24 = 8 % of the diameter.
+    // A cube is off by 11.6 % of the largest radius at its corners for degree 10: 0.116 * 0.866 / 1.24 = 8 % of the diameter.
     EXPECT_GT(number(table, 0, "max_error"), 0.02);
     EXPECT_LT(number(table, 0, "max_error"), 0.10);
     EXPECT_LT(number(table, 0, "rms_error"), 0.02);

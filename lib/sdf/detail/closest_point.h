@@ -1,7 +1,7 @@
 #pragma once
 /// \file sdf/detail/closest_point.h
 /// Distances from lattice nodes to a surface given by foot points: nearest foot point near the surface, its number carried
-/// outwards by sweeps, then refined to the closest point of the surface itself [geometry notes, section 2, step 4].
+/// outwards by sweeps, then refined to the closest point of the surface itself [docs/numerics.md, geometry].
 #include <Eigen/Core>
 #include <algorithm>
 #include <array>
