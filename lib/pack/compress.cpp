@@ -90,6 +90,14 @@ double stiffest(const Spec& spec)
 
 double step_of(const dem::World& world, const Spec& spec) { return spec.dem_step > 0 ? spec.dem_step : world.auto_time_step(); }
 
+/// Mean speed below which grains have landed [m/s]: forces are those of the skeleton and say nothing about loose fines.
+double settled_speed(const dem::World& world, const Spec& spec)
+{
+    double smallest = 1e300;
+    for (int i = 0; i < world.body_count(); ++i) smallest = std::min(smallest, 2 * world.equivalent_radius(i));
+    return spec.dropping.speed_ratio * std::sqrt(spec.gravity.norm() * smallest);
+}
+
 void set_frictions(dem::World& world, const Spec& spec, double friction)
 {
     for (std::size_t m = 0; m < spec.materials.size(); ++m)
@@ -128,7 +136,8 @@ double serve(dem::World& world, const Box& box, const Spec& spec, const std::arr
 bool to_pressure(dem::World& world, const Box& box, const Spec& spec)
 {
     const Compression& rule = spec.compression;
-    const double dt = step_of(world, spec), start = world.time(), kn = stiffest(spec), mass = total_mass(world);
+    const double dt = step_of(world, spec), start = world.time(), kn = stiffest(spec), mass = total_mass(world),
+                 slow = settled_speed(world, spec);
     set_frictions(world, spec, rule.friction);
     bool own_friction = rule.friction < 0, lid_touches = false;
     Progress progress("compressing", 1);
@@ -150,7 +159,8 @@ bool to_pressure(dem::World& world, const Box& box, const Spec& spec)
             set_frictions(world, spec, -1);
             own_friction = true;
         }
-        if (own_friction && worst < rule.tolerance && means.unbalanced_ratio < rule.unbalanced_ratio && means.kinetic_ratio < 10 * rule.kinetic_ratio) {
+        if (own_friction && worst < rule.tolerance && means.unbalanced_ratio < rule.unbalanced_ratio && means.kinetic_ratio < 10 * rule.kinetic_ratio &&
+            means.speed < slow) {
             progress.finish();
             return true;
         }
@@ -229,6 +239,7 @@ MotionWindow::Means relax(dem::World& world, const Spec& spec, PackReport& repor
     const double dt = step_of(world, spec), start = world.time();
     set_frictions(world, spec, -1);
     Progress progress("relaxing", rule.relaxation_limit);
+    const double slow = settled_speed(world, spec);
     MotionWindow window(world);
     MotionWindow::Means means;
     report.relaxed = false;
@@ -236,7 +247,8 @@ MotionWindow::Means relax(dem::World& world, const Spec& spec, PackReport& repor
         window.start(world);
         for (int check = 0; check < checks_per_window; ++check) step_some(world, dt, rule.drag);
         means = window.means(world);
-        report.relaxed = means.unbalanced_ratio < rule.unbalanced_ratio && means.kinetic_ratio < rule.kinetic_ratio;
+        report.relaxed = means.unbalanced_ratio < rule.unbalanced_ratio && means.kinetic_ratio < rule.kinetic_ratio &&
+                         means.speed < slow;
         progress.update(std::min(world.time() - start, 0.99 * rule.relaxation_limit),
                         "unbalanced ratio " + to_text(std::round(1e5 * means.unbalanced_ratio) / 1e5));
     }

@@ -42,7 +42,7 @@ struct Dropping {
     double drop_height = 0;          ///< gap between the highest settled grain and a new one [m]
     double friction = 0.1;           ///< sliding friction while grains settle [-]
     double damping = 0.5;            ///< contact damping ratio while grains settle [-]
-    double stiffness_factor = 0.005; ///< softens contacts while grains settle; the step grows by 1/sqrt of it [-]
+    double stiffness_factor = 0.02;  ///< softens contacts while grains settle; the step grows by 1/sqrt of it [-]
     double drag = 10;                ///< rate at which velocities decay while grains settle [1/s]
     double unbalanced_ratio = 0.1;   ///< a layer has settled when the unbalanced ratio is below this ...
     double speed_ratio = 0.05;       ///< ... and the mean speed below this times sqrt(g d), d of the smallest grain
