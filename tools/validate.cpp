@@ -107,7 +107,7 @@ std::vector<Check> fine_settling(const Case& c, const Results& r)
         const double mid = 0.5 * (low + high);
         (coral::fluid::drag_coefficient(coral::fluid::DragLaw::schiller_naumann, 1, mid, d, rho, nu) * mid < weight ? low : high) = mid;
     }
-    std::vector<Check> checks{{"terminal speed (Schiller and Naumann)", "m/s", low, column(r.trajectories, "speed").back(), 0.2}};
+    std::vector<Check> checks{{"terminal speed (Schiller and Naumann)", "m/s", low, column(r.trajectories, "speed").back(), 0.1}};
     for (const Check& b : balances(r)) checks.push_back(b);
     return checks;
 }
