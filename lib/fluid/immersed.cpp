@@ -1,11 +1,11 @@
 #include "fluid/immersed.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 
 #include "core/error.h"
 #include "core/parallel.h"
+#include "core/stopwatch.h"
 #include "fluid/detail/lanes.h"
 #include "fluid/detail/raster.h"
 
@@ -260,16 +260,6 @@ double forcing_weight(const ForcingOptions& options, double phi, double slip, do
     const double chi = dt * rate * phi / (1.0 - phi);
     return chi / (1.0 + chi);
 }
-
-class Stopwatch {
-public:
-    explicit Stopwatch(double& total) : total_(total), start_(std::chrono::steady_clock::now()) {}
-    ~Stopwatch() { total_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
-
-private:
-    double& total_;
-    std::chrono::steady_clock::time_point start_;
-};
 
 /// Growth of the solid's velocity per cell along a row.
 template <int c>

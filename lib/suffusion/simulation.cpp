@@ -1,9 +1,9 @@
 #include "suffusion/simulation.h"
 
-#include <chrono>
 #include <cmath>
 
 #include "core/error.h"
+#include "core/stopwatch.h"
 #include "core/text.h"
 #include "suffusion/bytes.h"
 
@@ -16,22 +16,6 @@ namespace {
 constexpr double grain_cells = 0.1, fine_cells = 0.3;  ///< farthest move in a flow step [cells; docs/numerics.md]
 constexpr int dry_substeps = 256;                      ///< contact steps between two looks at the outside
 constexpr double speed_bound = 1e3;                    ///< [m/s]: beyond it a run has blown up
-
-double now()
-{
-    return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
-
-/// Adds the time until it goes out of scope to a counter.
-class Stopwatch {
-public:
-    explicit Stopwatch(double& total) : total_(total), start_(now()) {}
-    ~Stopwatch() { total_ += now() - start_; }
-
-private:
-    double& total_;
-    double start_;
-};
 
 fluid::FlowOptions flow_options(const Case& c)
 {

@@ -1,7 +1,6 @@
 #include "pack/pack.h"
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <cmath>
 #include <numbers>
@@ -12,19 +11,13 @@
 #include "core/progress.h"
 #include "pack/populations.h"
 #include "pack/sample_world.h"
+#include "pack/scratch.h"
 #include "sdf/mass_properties.h"
 #include "sdf/vdb_io.h"
 
 using namespace coral::pack;
 
 namespace {
-
-std::filesystem::path scratch(const std::string& name)
-{
-    const auto folder = std::filesystem::path(testing::TempDir()) / ("coral_packing_" + std::to_string(::getpid()));
-    std::filesystem::create_directories(folder);
-    return folder / name;
-}
 
 Spec spec_of(const std::string& text)
 {

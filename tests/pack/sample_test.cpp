@@ -1,7 +1,7 @@
 #include "pack/sample.h"
+#include "pack/scratch.h"
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <cmath>
 #include <fstream>
@@ -16,13 +16,6 @@
 using namespace coral::pack;
 
 namespace {
-
-std::filesystem::path scratch(const std::string& name)
-{
-    const auto folder = std::filesystem::path(testing::TempDir()) / ("coral_pack_" + std::to_string(::getpid()));
-    std::filesystem::create_directories(folder);
-    return folder / name;
-}
 
 /// A sample whose every number is different and awkward.
 Sample awkward_sample()
