@@ -2,10 +2,10 @@
 #include "fluid/porous.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 
 #include "core/parallel.h"
+#include "core/stopwatch.h"
 #include "fluid/detail/fines.h"
 
 namespace coral::fluid {
@@ -19,16 +19,6 @@ namespace {
 using detail::particles_per_chunk;
 using detail::planes_per_slab;
 using detail::wrap;
-
-class Stopwatch {
-public:
-    explicit Stopwatch(double& total) : total_(total), start_(std::chrono::steady_clock::now()) {}
-    ~Stopwatch() { total_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
-
-private:
-    double& total_;
-    std::chrono::steady_clock::time_point start_;
-};
 
 Vector4d quad(const Field& quads, std::size_t at)
 {
@@ -128,6 +118,8 @@ void FineCoupling::deposit_volume(Flow& flow, std::span<const double> volumes, s
         const double v = volumes[p] * inverse;
         return Vector4d(v, v * velocities[p].x(), v * velocities[p].y(), v * velocities[p].z());
     });
+    own_solid_.resize(count_);
+    for (std::size_t p = 0; p < count_; ++p) own_solid_[p] = own_overlap_[p] * volumes[p] * inverse;
     PorousFields& fields = flow.porous_fields_for_writing();
     const double most = 1.0 - options_.smallest_void_fraction;
     std::vector<char> clipped(std::size_t(grid_.cells.z()), 0);
@@ -245,7 +237,7 @@ void FineCoupling::feel(const Flow& flow, std::span<FeltFlow> felt) const
     gather(
         felt_, [&](std::size_t b) { return quad(block_quads_, b); }, sums_);
     for (std::size_t i = 0; i < count_; ++i) {
-        felt[i].void_fraction = sums_[i][0];
+        felt[i].void_fraction = bulk_void_fraction(sums_[i][0], own_solid_[i]);
         felt[i].velocity = sums_[i].tail<3>() / sums_[i][0];
     }
 }

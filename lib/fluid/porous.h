@@ -21,13 +21,22 @@ struct KernelOptions {
     double felt_support = 4.0;      ///< the same for what a particle feels and for its drag reaction
     double smallest_support = 3.0;  ///< lower limit of the volume support [cells]; the felt one keeps its ratio to it
     double smallest_void_fraction = 0.15;
+    bool exclude_own_volume = true;  ///< see bulk_void_fraction(); false: the plain kernel mean
     int coupling_cells =
         0;  ///< felt averages work on blocks of this many cells along an edge; 0 chooses (1 when d < 3 cells)
 };
 
+/// Void fraction of the bed around a particle, from the kernel mean at its centre. The mean counts the particle's own
+/// volume, yet the gap that the other particles leave around it makes up for that in a dense bed. What is left over is
+/// own_solid S, S the structure factor of hard spheres at long waves, (1 - phi)^4/(1 + 2 phi)^2 [Percus & Yevick 1958;
+/// Wertheim 1963], here of the solid fraction phi of the others: all of it for a particle alone, 2 % of it in a dense
+/// bed.
+/// \param felt  kernel mean of the void fraction \param own_solid  part of 1 - felt that is the particle itself
+double bulk_void_fraction(double felt, double own_solid);
+
 /// What one particle feels.
 struct FeltFlow {
-    double void_fraction = 1.0;                                   ///< wide kernel
+    double void_fraction = 1.0;                                   ///< wide kernel, bulk_void_fraction()
     Eigen::Vector3d velocity = Eigen::Vector3d::Zero();           ///< interstitial, wide kernel [m/s]
     Eigen::Vector3d pressure_gradient = Eigen::Vector3d::Zero();  ///< of the kinematic pressure, volume kernel [m/s2]
 };
@@ -103,6 +112,7 @@ private:
     template <class Value>
     void gather(const std::vector<Weights>& chunks, const Value& value, std::span<Eigen::Vector4d> sums) const;
     void deposit_flux(int axis, Field& flux) const;
+    void find_own_overlap();
     void gather_pressure_gradient(const Flow& flow, std::span<FeltFlow> felt) const;
     template <class Fill>
     void average_blocks(Quads& quads, const Fill& fill) const;
@@ -116,6 +126,8 @@ private:
     Target cells_, blocks_;
     std::vector<std::size_t> order_;  // of the particles in the weights: neighbours follow each other
     std::vector<Weights> volume_, felt_;
+    std::vector<double> own_overlap_;  // sum_c w_ic (volume) w_ic (felt): solid fraction felt of itself, per h3
+    std::vector<double> own_solid_;    // the same times its volume / h3
     Field open_cells_, open_blocks_;  // 1 - phi per cell (padded); its sum per block
     Field void_fraction_;             // of the next step; changes places with the flow's
     Field clip_;                      // (1 - eps)/(raw solid fraction); empty when nothing is clipped

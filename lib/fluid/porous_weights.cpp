@@ -57,6 +57,13 @@ double peskin_kernel(double r)
     return r <= 1.0 ? inner : (r <= 2.0 ? outer : 0.0);
 }
 
+double bulk_void_fraction(double felt, double own_solid)
+{
+    const double others = std::max(1.0 - felt - own_solid, 0.0);
+    const double open = 1.0 - others, wide = 1.0 + 2.0 * others;
+    return felt + own_solid * open * open * open * open / (wide * wide);
+}
+
 FineCoupling::FineCoupling(const GridSpec& grid, const KernelOptions& options)
     : grid_(grid), layout_(grid.cells), options_(options)
 {
@@ -235,6 +242,45 @@ void FineCoupling::find_weights(std::vector<Weights>& chunks, const Target& targ
     });
 }
 
+void FineCoupling::find_own_overlap()
+{
+    own_overlap_.assign(count_, 0.0);
+    if (!options_.exclude_own_volume) return;
+    parallel_blocks(volume_.size(), 1, [&](std::size_t chunk, std::size_t) {
+        thread_local Field felt;  // zero between particles
+        felt.resize(blocks_.total, 0.0);
+        const Weights &narrow = volume_[chunk], &wide = felt_[chunk];
+        for (std::size_t p = 0; p < narrow.low_plane.size(); ++p) {
+            const auto each_wide = [&](auto&& visit) {
+                const double* weight = wide.values.data() + wide.first_value[p];
+                for (std::size_t r = wide.first_row[p]; r < wide.first_row[p + 1]; ++r) {
+                    const Row& row = wide.rows[r];
+                    if (row.plane >= narrow.low_plane[p] / block_ && row.plane <= narrow.high_plane[p] / block_)
+                        for (int l = 0; l < row.length; ++l) visit(felt[row.start + std::size_t(l)], weight[l]);
+                    weight += row.length;
+                }
+            };
+            each_wide([](double& at, double weight) { at += weight; });
+            double sum = 0.0;
+            const double* weight = narrow.values.data() + narrow.first_value[p];
+            for (std::size_t r = narrow.first_row[p]; r < narrow.first_row[p + 1]; ++r) {
+                const Row& row = narrow.rows[r];
+                const std::ptrdiff_t in_plane = std::ptrdiff_t(row.start) - cells_.offset - row.plane * cells_.stride[2];
+                const std::ptrdiff_t j = in_plane / cells_.stride[1], i = in_plane - j * cells_.stride[1];
+                const std::ptrdiff_t b0 = (row.plane / block_) * blocks_.stride[2] + (j / block_) * blocks_.stride[1];
+                for (int l = 0; l < row.length; ++l) {
+                    const auto b = std::size_t(b0 + (i + l) / block_);
+                    const double open = open_blocks_[b];
+                    if (open > 0.0) sum += weight[l] * felt[b] * open_cells_[row.start + std::size_t(l)] / open;
+                }
+                weight += row.length;
+            }
+            own_overlap_[order_[chunk * particles_per_chunk + p]] = sum;
+            each_wide([](double& at, double) { at = 0.0; });
+        }
+    });
+}
+
 /// Neighbours in space become neighbours in memory: through layers of four cells, columns of four cells, then along x.
 void FineCoupling::sort_particles(std::span<const Vector3d> positions)
 {
@@ -258,6 +304,7 @@ void FineCoupling::place(std::span<const Vector3d> positions, std::span<const do
     find_open(cell_solid);
     find_weights(volume_, cells_, open_cells_, 1.0, positions, diameters);
     find_weights(felt_, blocks_, open_blocks_, options_.felt_support / options_.volume_support, positions, diameters);
+    find_own_overlap();
 }
 
 }  // namespace coral::fluid

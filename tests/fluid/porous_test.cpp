@@ -174,6 +174,53 @@ TEST(FineCoupling, keeps_out_of_resolved_grains)
     EXPECT_GT(felt[1].void_fraction, 0.1);
 }
 
+TEST(FineCoupling, a_particle_alone_feels_no_solid)
+{
+    const double grain_radius = 4e-3;
+    const std::vector<Vector3d> places{{8.2e-3, 8.1e-3, 12.4e-3}, {0.6e-3, 0.7e-3, 12e-3}, {8e-3, 8e-3, 4e-3 + grain_radius + 0.8e-3}};
+    for (const int cells : {1, 2})
+        for (const BoundaryKind kind : {BoundaryKind::wall, BoundaryKind::periodic})
+            for (const Vector3d& place : places) {
+                const GridSpec grid = box({16, 16, 20}, 1e-3, kind);
+                std::vector<RigidMotion> motions(1);
+                motions[0].position = Vector3d(8e-3, 8e-3, 4e-3);
+                ImmersedBodies bodies(grid);
+                bodies.add(sphere_shape(2 * grain_radius), motions[0]);
+                bodies.place(motions);
+                Flow flow(grid, {});
+                Fines fines;
+                fines.add(place, 1.6e-3);
+                KernelOptions options;
+                options.coupling_cells = cells;
+                std::vector<FeltFlow> plain(1), felt(1);
+                for (const bool exclude : {false, true}) {
+                    options.exclude_own_volume = exclude;
+                    FineCoupling coupling(grid, options);
+                    coupling.place(fines.positions, fines.diameters, &bodies.cell_solid_fraction());
+                    coupling.deposit_volume(flow, fines.volumes, fines.velocities);
+                    coupling.feel(flow, exclude ? felt : plain);
+                }
+                EXPECT_LT(plain[0].void_fraction, 0.97);
+                EXPECT_NEAR(felt[0].void_fraction, 1.0, 1e-9) << cells << " " << int(kind) << " " << place.transpose();
+            }
+}
+
+TEST(FineCoupling, own_volume_matters_less_the_denser_the_bed)
+{
+    EXPECT_NEAR(bulk_void_fraction(0.95, 0.05), 1.0, 1e-9);
+    EXPECT_EQ(bulk_void_fraction(0.95, 0.0), 0.95);
+    EXPECT_NEAR(bulk_void_fraction(0.5, 0.05), 0.5, 1.5e-3);
+    double last = 0.0;
+    for (double felt = 0.95; felt > 0.3; felt -= 0.05) {
+        const double added = bulk_void_fraction(felt, 0.05) - felt;
+        EXPECT_GT(added, 0.0);
+        if (last > 0.0) {
+            EXPECT_LT(added, last);
+        }
+        last = added;
+    }
+}
+
 TEST(FineCoupling, feels_a_uniform_flow_exactly_whatever_the_blocks)
 {
     const GridSpec grid = box({18, 12, 24}, 1e-3, BoundaryKind::periodic);
