@@ -1,5 +1,6 @@
 #include "cli.h"
 
+#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
@@ -179,32 +180,16 @@ int report(const std::string& tool, const std::string& message, int code)
 
 }  // namespace
 
-CLI::Option* add_quantity(CLI::App& app, const std::string& name, double& value, Dimension dimension, const std::string& help)
-{
-    auto* option = app.add_option_function<std::string>(
-        name,
-        [&value, dimension, name](const std::string& text) {
-            try {
-                value = parse_quantity(text, dimension, "");
-            } catch (const UsageError& error) {
-                throw CLI::ValidationError(name, error.what());
-            }
-        },
-        help);
-    option->type_name(std::string("[") + std::string(si_unit(dimension)) + "]");
-    if (std::isfinite(value)) option->default_str(format_quantity(value, dimension));
-    return option;
-}
-
 int run_tool(int argc, char** argv, const std::string& name, const std::string& description,
-             const std::function<void(CLI::App&)>& declare, const std::function<void(const Context&)>& run, std::uint64_t* seed)
+             const std::function<void(Options&)>& declare, const std::function<void(const Context&)>& run, std::uint64_t* seed)
 {
     CLI::App app(description, name);
     app.option_defaults()->always_capture_default();
     CommonOptions common;
     std::vector<std::string> arguments(argv + 1, argv + argc);
     try {
-        declare(app);
+        Options options(app);
+        declare(options);
         if (seed) app.add_option("--seed", *seed, "Seed of the random numbers");
         app.add_option("--threads", common.threads, "Threads; 0 takes all cores")->check(CLI::Range(0, 1024));
         app.add_flag("--quiet", common.quiet, "No progress and no summary");

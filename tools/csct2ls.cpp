@@ -35,25 +35,25 @@ struct Options {
     double spacing = 0, throat = 0, minimum_diameter = 0, scale_to = 0;
 };
 
-void declare(CLI::App& app, Options& o)
+void declare(cli::Options& options, Options& o)
 {
-    app.add_option("STACK", o.stack, "TIFF stack, .nrrd, .mhd/.mha, .raw, file.h5:/dataset, folder or list of TIFF slices")->required();
-    app.add_option("-o,--output", o.output, "Level sets of the grains, .vdb")->required();
-    app.add_option("--voxel-size", o.voxel_size, "Voxel edge, or x,y,z edges, such as 30um; wins over the file's own");
-    cli::add_quantity(app, "--spacing", o.spacing, Dimension::length, "Node spacing of the level sets; 0 takes twice the voxel edge, or D/75 with --scale-to");
-    app.add_option("--band", o.band, "True distances kept inside,outside the surface [nodes]");
-    app.add_option("--labels", o.labels, "What the numbers are; auto: two values are a mask, more are labels")->check(CLI::IsMember({"auto", "binary", "labels"}));
-    app.add_option("--solid", o.solid, "Solid phase of a mask or grey stack: bright, dark or the value itself");
-    app.add_option("--threshold", o.threshold, "Grey value between void and solid, or otsu");
-    app.add_option("--split", o.split, "Splitting of touching grains in a mask")->check(CLI::IsMember({"none", "watershed"}));
-    cli::add_quantity(app, "--throat", o.throat, Dimension::length, "Widest throat closed by the apparent shape, in the CT; 0 takes a fifth of each grain's diameter");
-    app.add_option("--border", o.border, "Grains cut by the border of the stack")->check(CLI::IsMember({"drop", "keep"}));
-    cli::add_quantity(app, "--min-diameter", o.minimum_diameter, Dimension::length, "Smallest grain kept, equivalent diameter in the CT; 0 takes 8 voxels");
-    cli::add_quantity(app, "--scale-to", o.scale_to, Dimension::length, "Equivalent diameter every grain is scaled to; 0 keeps sizes");
-    app.add_option("--table", o.table, "Descriptors of the grains, .csv");
-    app.add_option("--mesh", o.mesh, "Folder for a mesh per grain, grain_<id>.ply");
-    app.add_option("--shape", o.shape, "Size nx,ny,nz of a .raw file");
-    app.add_option("--type", o.type, "Numbers of a .raw file")->check(CLI::IsMember({"u8", "u16", "u32", "i8", "i16", "i32", "f32", "f64"}));
+    options.add("STACK", o.stack, "TIFF stack, .nrrd, .mhd/.mha, .raw, file.h5:/dataset, folder or list of TIFF slices").required();
+    options.add("-o,--output", o.output, "Level sets of the grains, .vdb").required();
+    options.add("--voxel-size", o.voxel_size, "Voxel edge, or x,y,z edges, such as 30um; wins over the file's own");
+    options.quantity("--spacing", o.spacing, Dimension::length, "Node spacing of the level sets; 0 takes twice the voxel edge, or D/75 with --scale-to");
+    options.add("--band", o.band, "True distances kept inside,outside the surface [nodes]");
+    options.add("--labels", o.labels, "What the numbers are; auto: two values are a mask, more are labels").one_of({"auto", "binary", "labels"});
+    options.add("--solid", o.solid, "Solid phase of a mask or grey stack: bright, dark or the value itself");
+    options.add("--threshold", o.threshold, "Grey value between void and solid, or otsu");
+    options.add("--split", o.split, "Splitting of touching grains in a mask").one_of({"none", "watershed"});
+    options.quantity("--throat", o.throat, Dimension::length, "Widest throat closed by the apparent shape, in the CT; 0 takes a fifth of each grain's diameter");
+    options.add("--border", o.border, "Grains cut by the border of the stack").one_of({"drop", "keep"});
+    options.quantity("--min-diameter", o.minimum_diameter, Dimension::length, "Smallest grain kept, equivalent diameter in the CT; 0 takes 8 voxels");
+    options.quantity("--scale-to", o.scale_to, Dimension::length, "Equivalent diameter every grain is scaled to; 0 keeps sizes");
+    options.add("--table", o.table, "Descriptors of the grains, .csv");
+    options.add("--mesh", o.mesh, "Folder for a mesh per grain, grain_<id>.ply");
+    options.add("--shape", o.shape, "Size nx,ny,nz of a .raw file");
+    options.add("--type", o.type, "Numbers of a .raw file").one_of({"u8", "u16", "u32", "i8", "i16", "i32", "f32", "f64"});
 }
 
 /// Seconds since the last lap, by stage.
@@ -434,5 +434,5 @@ int main(int argc, char** argv)
     coral::Options options;
     return coral::cli::run_tool(
         argc, argv, "csct2ls", "CT stack of grains to level sets, with intraparticle voids and with the apparent shape",
-        [&](CLI::App& app) { coral::declare(app, options); }, [&](const coral::cli::Context& context) { coral::run(options, context); });
+        [&](coral::cli::Options& declared) { coral::declare(declared, options); }, [&](const coral::cli::Context& context) { coral::run(options, context); });
 }

@@ -17,11 +17,11 @@ struct Options {
     std::filesystem::path libraries = "/usr/share/javascript";
 };
 
-void declare(CLI::App& app, Options& o)
+void declare(coral::cli::Options& options, Options& o)
 {
-    app.add_option("case", o.cases, "Case folders with the results.h5 of suffuse; several are compared")->required();
-    app.add_option("-o,--output", o.output, "Folder to write; an earlier report there is replaced")->capture_default_str();
-    app.add_option("--libraries", o.libraries, "Folder with dygraphs/ and three/ for the interactive part (libjs-dygraphs, libjs-three)")->capture_default_str();
+    options.add("case", o.cases, "Case folders with the results.h5 of suffuse; several are compared").required();
+    options.add("-o,--output", o.output, "Folder to write; an earlier report there is replaced");
+    options.add("--libraries", o.libraries, "Folder with dygraphs/ and three/ for the interactive part (libjs-dygraphs, libjs-three)");
 }
 
 ordered_json number(double value) { return std::isfinite(value) ? ordered_json(value) : ordered_json(nullptr); }
@@ -74,5 +74,5 @@ int main(int argc, char** argv)
     Options options;
     return coral::cli::run_tool(
         argc, argv, "erosion-report", "Erosion curves, figures and one offline page from the results of suffuse",
-        [&](CLI::App& app) { declare(app, options); }, [&](const coral::cli::Context& context) { run(options, context); });
+        [&](coral::cli::Options& declared) { declare(declared, options); }, [&](const coral::cli::Context& context) { run(options, context); });
 }

@@ -1,3 +1,4 @@
+#include <CLI/Version.hpp>
 #include <Eigen/Core>
 #include <fmt/core.h>
 #include <hdf5.h>

@@ -29,16 +29,18 @@ struct Options {
 
 constexpr int lowest_degree = 2, highest_degree = 30;  // searched for a tolerance when no degree bounds it
 
-void declare(CLI::App& app, Options& o)
+/// \return the option --degree
+cli::Option declare(cli::Options& options, Options& o)
 {
-    app.add_option("input", o.input, "Level sets of grains, .vdb of csct2ls")->required()->check(CLI::ExistingFile);
-    app.add_option("-o,--output", o.output, "Harmonic shapes, .sh.h5")->required();
-    app.add_option("--degree", o.degree, "Degree of the harmonics; with --tolerance the highest tried (then 30)")->capture_default_str()->check(CLI::Range(2, 60));
-    cli::add_quantity(app, "--tolerance", o.tolerance, Dimension::number, "Lowest degree whose RMS error is below this share of the equivalent diameter (2%); 0 takes --degree");
-    app.add_option("--table", o.table, "Errors per grain, .csv");
-    app.add_option("--convergence", o.convergence, "Errors per grain and degree from 2, .csv");
-    app.add_flag("--force", o.force, "Fit grains that are far from star-shaped by their outer envelope");
-    app.add_flag("--skip", o.skip, "Leave such grains out");
+    options.add("input", o.input, "Level sets of grains, .vdb of csct2ls").required().existing_file();
+    options.add("-o,--output", o.output, "Harmonic shapes, .sh.h5").required();
+    const cli::Option degree = options.add("--degree", o.degree, "Degree of the harmonics; with --tolerance the highest tried (then 30)").between(2, 60);
+    options.quantity("--tolerance", o.tolerance, Dimension::number, "Lowest degree whose RMS error is below this share of the equivalent diameter (2%); 0 takes --degree");
+    options.add("--table", o.table, "Errors per grain, .csv");
+    options.add("--convergence", o.convergence, "Errors per grain and degree from 2, .csv");
+    options.flag("--force", o.force, "Fit grains that are far from star-shaped by their outer envelope");
+    options.flag("--skip", o.skip, "Leave such grains out");
+    return degree;
 }
 
 struct Fitted {
@@ -219,15 +221,12 @@ void run(const Options& o, const cli::Context& context)
 int main(int argc, char** argv)
 {
     Options o;
-    CLI::Option* degree = nullptr;
+    cli::Option degree;
     return cli::run_tool(
         argc, argv, "ls2sh", "Level sets of grains to spherical harmonics of their apparent shapes",
-        [&](CLI::App& app) {
-            declare(app, o);
-            degree = app.get_option("--degree");
-        },
+        [&](cli::Options& declared) { degree = declare(declared, o); },
         [&](const cli::Context& context) {
-            o.degree_given = degree->count() > 0;
+            o.degree_given = degree.given();
             run(o, context);
         });
 }

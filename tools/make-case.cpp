@@ -20,18 +20,18 @@ struct Options {
     bool explain = false;
 };
 
-void declare(CLI::App& app, Options& o)
+void declare(coral::cli::Options& options, Options& o)
 {
     using namespace coral;
-    app.add_option("sample", o.sample, "Packed sample, sample.h5")->required();
-    app.add_option("-o,--output", o.output, "Folder of the case");
-    cli::add_quantity(app, "--velocity", o.plan.velocity, Dimension::velocity, "Flow at the inlet, downwards");
-    cli::add_quantity(app, "--angle", o.plan.angle, Dimension::angle, "Between flow and gravity (gravity is turned)");
-    cli::add_quantity(app, "--hole", o.plan.hole, Dimension::length, "Edge of the filter's square holes; 0: 0.4 of the smallest coarse grain");
-    cli::add_quantity(app, "--cell", o.plan.cell, Dimension::length, "Edge of the flow cells; 0: a thirtieth of the smallest coarse grain");
-    cli::add_quantity(app, "--duration", o.plan.duration, Dimension::time, "Length of the run");
-    app.add_option("--engine", o.engine, "Flow solver: embedded or openfoam");
-    app.add_flag("--explain", o.explain, "Print the plan only");
+    options.add("sample", o.sample, "Packed sample, sample.h5").required();
+    options.add("-o,--output", o.output, "Folder of the case");
+    options.quantity("--velocity", o.plan.velocity, Dimension::velocity, "Flow at the inlet, downwards");
+    options.quantity("--angle", o.plan.angle, Dimension::angle, "Between flow and gravity (gravity is turned)");
+    options.quantity("--hole", o.plan.hole, Dimension::length, "Edge of the filter's square holes; 0: 0.4 of the smallest coarse grain");
+    options.quantity("--cell", o.plan.cell, Dimension::length, "Edge of the flow cells; 0: a thirtieth of the smallest coarse grain");
+    options.quantity("--duration", o.plan.duration, Dimension::time, "Length of the run");
+    options.add("--engine", o.engine, "Flow solver: embedded or openfoam");
+    options.flag("--explain", o.explain, "Print the plan only");
 }
 
 nlohmann::ordered_json json_plan(const coral::suffusion::Plan& plan)
@@ -86,6 +86,6 @@ int main(int argc, char** argv)
 {
     Options options;
     return coral::cli::run_tool(
-        argc, argv, "make-case", "Packed sample to suffusion case", [&](CLI::App& app) { declare(app, options); },
+        argc, argv, "make-case", "Packed sample to suffusion case", [&](coral::cli::Options& declared) { declare(declared, options); },
         [&](const coral::cli::Context& context) { run(options, context); });
 }

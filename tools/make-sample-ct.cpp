@@ -18,58 +18,38 @@ struct Options {
     bool is_binary = false, is_grey = false;
 };
 
-void declare(CLI::App& app, Options& o)
+void declare(cli::Options& options, Options& o)
 {
-    using cli::add_quantity;
     phantom::SampleSpec& s = o.sample;
-    app.add_option("-o,--output", o.output, "Stack, multi-page TIFF with ImageJ's calibration")->required();
-    app.add_option("--truth", o.truth, "CSV of the true figures, one row a grain, SI");
-    app.add_option("--grains", s.grains, "Number of grains")->capture_default_str()->check(CLI::Range(1, 65535));
-    app.add_option("--sticks", s.sticks, "How many of them are sticks")
-        ->capture_default_str()
-        ->check(CLI::NonNegativeNumber);
-    add_quantity(app, "--diameter", s.diameter, Dimension::length,
+    options.add("-o,--output", o.output, "Stack, multi-page TIFF with ImageJ's calibration").required();
+    options.add("--truth", o.truth, "CSV of the true figures, one row a grain, SI");
+    options.add("--grains", s.grains, "Number of grains").between(1, 65535);
+    options.add("--sticks", s.sticks, "How many of them are sticks").not_negative();
+    options.quantity("--diameter", s.diameter, Dimension::length,
                  "Mean equivalent diameter of the grains, voids filled");
-    add_quantity(app, "--spread", s.spread, Dimension::number, "Diameters are uniform in diameter*(1 +- spread)");
-    add_quantity(app, "--voxel-size", o.voxel_size, Dimension::length, "Edge of a voxel");
-    add_quantity(app, "--slice-spacing", o.slice_spacing, Dimension::length,
+    options.quantity("--spread", s.spread, Dimension::number, "Diameters are uniform in diameter*(1 +- spread)");
+    options.quantity("--voxel-size", o.voxel_size, Dimension::length, "Edge of a voxel");
+    options.quantity("--slice-spacing", o.slice_spacing, Dimension::length,
                  "Distance of slices; 0: as the voxel size");
-    app.add_option("--degree", s.degree, "Spherical-harmonic degree of the outlines")
-        ->capture_default_str()
-        ->check(CLI::Range(2, 40));
-    add_quantity(app, "--porosity", s.voids.porosity, Dimension::number, "Intraparticle porosity; 0: solid grains");
-    app.add_flag("!--no-sponge", s.voids.sponge, "Only chambers and channels; the porosity is what they give");
-    add_quantity(app, "--wavelength", s.voids.wavelength, Dimension::number,
+    options.add("--degree", s.degree, "Spherical-harmonic degree of the outlines").between(2, 40);
+    options.quantity("--porosity", s.voids.porosity, Dimension::number, "Intraparticle porosity; 0: solid grains");
+    options.flag("!--no-sponge", s.voids.sponge, "Only chambers and channels; the porosity is what they give");
+    options.quantity("--wavelength", s.voids.wavelength, Dimension::number,
                  "One void and one wall of the sponge / diameter");
-    app.add_option("--compartments", s.voids.compartments, "Parts of a grain divided by septa")
-        ->capture_default_str()
-        ->check(CLI::Range(1, 1000));
-    add_quantity(app, "--open", s.voids.open_share, Dimension::number,
+    options.add("--compartments", s.voids.compartments, "Parts of a grain divided by septa").between(1, 1000);
+    options.quantity("--open", s.voids.open_share, Dimension::number,
                  "Share of the compartments that are open to the outside");
-    add_quantity(app, "--wall", s.voids.wall, Dimension::number, "Least thickness of skin and septa / diameter");
-    app.add_option("--chambers", s.voids.chambers, "Sealed spheres in a grain")
-        ->capture_default_str()
-        ->check(CLI::Range(0, 1000));
-    app.add_option("--channels", s.voids.channels, "Cylinders from the outside to a blind ball in a grain")
-        ->capture_default_str()
-        ->check(CLI::Range(0, 1000));
-    app.add_option("--chamber-radius", s.voids.chamber_radius, "Smallest and largest / diameter")
-        ->capture_default_str();
-    app.add_option("--channel-radius", s.voids.channel_radius, "Smallest and largest / diameter")
-        ->capture_default_str();
-    app.add_option("--gap", s.gap, "Voxels between the boxes of grains and around them")
-        ->capture_default_str()
-        ->check(CLI::Range(1, 1000));
-    app.add_flag("--touching", s.touching, "Slide the grains together until they touch");
-    auto* binary = app.add_flag("--binary", o.is_binary, "Write solid 255, void 0 instead of labels");
-    app.add_flag("--grey", o.is_grey, "Write grey values with partial volume and noise instead of labels")
-        ->excludes(binary);
-    app.add_option("--noise", o.grey.noise, "Standard deviation of the grey values")
-        ->capture_default_str()
-        ->check(CLI::NonNegativeNumber);
-    app.add_option("--supersample", s.supersample, "Points per voxel and axis on which the truth is counted; odd")
-        ->capture_default_str()
-        ->check(CLI::Range(1, 9));
+    options.quantity("--wall", s.voids.wall, Dimension::number, "Least thickness of skin and septa / diameter");
+    options.add("--chambers", s.voids.chambers, "Sealed spheres in a grain").between(0, 1000);
+    options.add("--channels", s.voids.channels, "Cylinders from the outside to a blind ball in a grain").between(0, 1000);
+    options.add("--chamber-radius", s.voids.chamber_radius, "Smallest and largest / diameter");
+    options.add("--channel-radius", s.voids.channel_radius, "Smallest and largest / diameter");
+    options.add("--gap", s.gap, "Voxels between the boxes of grains and around them").between(1, 1000);
+    options.flag("--touching", s.touching, "Slide the grains together until they touch");
+    const cli::Option binary = options.flag("--binary", o.is_binary, "Write solid 255, void 0 instead of labels");
+    options.flag("--grey", o.is_grey, "Write grey values with partial volume and noise instead of labels").excludes(binary);
+    options.add("--noise", o.grey.noise, "Standard deviation of the grey values").not_negative();
+    options.add("--supersample", s.supersample, "Points per voxel and axis on which the truth is counted; odd").between(1, 9);
 }
 
 void check(const Options& o)
@@ -132,6 +112,6 @@ int main(int argc, char** argv)
     std::uint64_t seed = 1;
     return cli::run_tool(
         argc, argv, "make-sample-ct", "CT stack of random coral-like grains whose true figures are known",
-        [&](CLI::App& app) { declare(app, options); },
+        [&](coral::cli::Options& declared) { declare(declared, options); },
         [&](const cli::Context& context) { run(options, context, seed); }, &seed);
 }

@@ -18,11 +18,11 @@ struct Options {
     std::filesystem::path input, output, grains;
 };
 
-void declare(CLI::App& app, Options& o)
+void declare(cli::Options& options, Options& o)
 {
-    app.add_option("input", o.input, "Specification of the packing, .toml (keys: docs/pack-spec.md)")->required();
-    app.add_option("-o,--output", o.output, "Sample, .h5")->required();
-    app.add_option("--grains", o.grains, "Level-set grains, .vdb, in place of the files that the specification names")->check(CLI::ExistingFile);
+    options.add("input", o.input, "Specification of the packing, .toml (keys: docs/pack-spec.md)").required();
+    options.add("-o,--output", o.output, "Sample, .h5").required();
+    options.add("--grains", o.grains, "Level-set grains, .vdb, in place of the files that the specification names").existing_file();
 }
 
 /// JSON has no NaN: what does not exist is null.
@@ -117,6 +117,6 @@ int main(int argc, char** argv)
     Options options;
     std::uint64_t seed = 1;
     return cli::run_tool(
-        argc, argv, "pack-sample", "Pour, compress and relax grains to a gap-graded sample", [&](CLI::App& app) { declare(app, options); },
+        argc, argv, "pack-sample", "Pour, compress and relax grains to a gap-graded sample", [&](coral::cli::Options& declared) { declare(declared, options); },
         [&](const cli::Context& context) { run(options, context, seed); }, &seed);
 }

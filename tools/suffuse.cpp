@@ -20,13 +20,13 @@ struct Options {
     bool resume = false, no_timing = false;
 };
 
-void declare(CLI::App& app, Options& o)
+void declare(coral::cli::Options& options, Options& o)
 {
     using namespace coral;
-    app.add_option("case", o.path, "Folder with case.toml, or a .toml file")->required();
-    cli::add_quantity(app, "--until", o.until, Dimension::time, "Stop here with a checkpoint; the results stay those of a run to the end");
-    app.add_flag("--resume", o.resume, "Go on from checkpoint.h5");
-    app.add_flag("--no-timing", o.no_timing, "Leave wall-clock times out of results.h5: equal runs then give equal files");
+    options.add("case", o.path, "Folder with case.toml, or a .toml file").required();
+    options.quantity("--until", o.until, Dimension::time, "Stop here with a checkpoint; the results stay those of a run to the end");
+    options.flag("--resume", o.resume, "Go on from checkpoint.h5");
+    options.flag("--no-timing", o.no_timing, "Leave wall-clock times out of results.h5: equal runs then give equal files");
 }
 
 double value_of(const std::vector<coral::suffusion::Measure>& measures, const std::string& name)
@@ -88,6 +88,6 @@ int main(int argc, char** argv)
 {
     Options options;
     return coral::cli::run_tool(
-        argc, argv, "suffuse", "Case to erosion curve: flow, grains and fines, coupled", [&](CLI::App& app) { declare(app, options); },
+        argc, argv, "suffuse", "Case to erosion curve: flow, grains and fines, coupled", [&](coral::cli::Options& declared) { declare(declared, options); },
         [&](const coral::cli::Context& context) { run(options, context); });
 }

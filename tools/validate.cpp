@@ -129,12 +129,12 @@ struct Scene {
 const std::vector<Scene> scenes{{"free-fall", free_fall},         {"elastic-bounce", elastic_bounce}, {"cubic-array", cubic_array},  {"fine-settling", fine_settling},
                                 {"small-erosion", small_erosion}, {"ten-cate-e4-coarse", ten_cate},   {"ten-cate-e4", ten_cate}};
 
-void declare(CLI::App& app, Options& o)
+void declare(coral::cli::Options& options, Options& o)
 {
-    app.add_option("scenes", o.scenes, "Folder with one case folder a scene (pipeline/validation)")->required();
-    app.add_option("-o,--output", o.output, "Folder for the runs and validation.csv")->required();
-    app.add_option("--only", o.only, "Scenes to run");
-    app.add_option("--skip", o.skip, "Scenes to leave out (ten-cate-e4 takes minutes)");
+    options.add("scenes", o.scenes, "Folder with one case folder a scene (pipeline/validation)").required();
+    options.add("-o,--output", o.output, "Folder for the runs and validation.csv").required();
+    options.add("--only", o.only, "Scenes to run");
+    options.add("--skip", o.skip, "Scenes to leave out (ten-cate-e4 takes minutes)");
 }
 
 Results run_scene(const Options& o, const std::string& name, const coral::cli::Context& context)
@@ -184,6 +184,6 @@ int main(int argc, char** argv)
 {
     Options options;
     return coral::cli::run_tool(
-        argc, argv, "validate", "Runs the validation scenes and compares them with theory and experiment", [&](CLI::App& app) { declare(app, options); },
+        argc, argv, "validate", "Runs the validation scenes and compares them with theory and experiment", [&](coral::cli::Options& declared) { declare(declared, options); },
         [&](const coral::cli::Context& context) { run(options, context); });
 }
