@@ -237,6 +237,25 @@ void H5File::write(const std::string& path, std::span<const std::string> data)
 
 std::vector<std::size_t> H5File::dims(const std::string& path) const { return impl_->dims(impl_->open_dataset(path)); }
 std::vector<double> H5File::read_doubles(const std::string& path) const { return impl_->read<double>(path, H5T_NATIVE_DOUBLE); }
+
+std::vector<double> H5File::read_doubles(const std::string& path, std::size_t first, std::size_t count) const
+{
+    const Id dataset = impl_->open_dataset(path);
+    const std::vector<std::size_t> dims = impl_->dims(dataset);
+    if (dims.empty() || first + count > dims[0]) impl_->fail(path, "is shorter than asked for");
+    std::vector<hsize_t> start(dims.size(), 0), block(dims.begin(), dims.end());
+    start[0] = first;
+    block[0] = count;
+    std::size_t total = 1;
+    for (hsize_t n : block) total *= n;
+    const Id in_file(H5Dget_space(dataset), H5Sclose), in_memory(H5Screate_simple(int(block.size()), block.data(), nullptr), H5Sclose);
+    std::vector<double> values(total);
+    if (H5Sselect_hyperslab(in_file, H5S_SELECT_SET, start.data(), nullptr, block.data(), nullptr) < 0 ||
+        (total > 0 && H5Dread(dataset, H5T_NATIVE_DOUBLE, in_memory, in_file, H5P_DEFAULT, values.data()) < 0))
+        impl_->fail(path, "is damaged or holds no numbers");
+    return values;
+}
+
 std::vector<float> H5File::read_floats(const std::string& path) const { return impl_->read<float>(path, H5T_NATIVE_FLOAT); }
 std::vector<std::int64_t> H5File::read_integers(const std::string& path) const { return impl_->read<std::int64_t>(path, H5T_NATIVE_INT64); }
 std::vector<std::uint8_t> H5File::read_bytes(const std::string& path) const { return impl_->read<std::uint8_t>(path, H5T_NATIVE_UINT8); }

@@ -42,6 +42,8 @@ public:
     std::vector<std::size_t> dims(const std::string& path) const;
     /// Whole dataset, converted to the type asked for. \throws Error when absent or of another kind
     std::vector<double> read_doubles(const std::string& path) const;
+    /// `count` entries of the first axis from `first` on, with all of the other axes.
+    std::vector<double> read_doubles(const std::string& path, std::size_t first, std::size_t count) const;
     std::vector<float> read_floats(const std::string& path) const;
     std::vector<std::int64_t> read_integers(const std::string& path) const;
     std::vector<std::uint8_t> read_bytes(const std::string& path) const;

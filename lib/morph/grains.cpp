@@ -8,18 +8,19 @@ namespace coral::morph {
 namespace {
 
 /// Labels with a neighbour of another label. Thirteen offsets see every pair of the 26-neighbourhood once.
-std::unordered_set<std::uint32_t> touching_labels(std::span<const std::uint32_t> labels, const Eigen::Vector3i& size)
+template <class T>
+std::unordered_set<std::uint32_t> touching_labels(std::span<const T> labels, const Eigen::Vector3i& size)
 {
     std::unordered_set<std::uint32_t> touching;
-    std::uint32_t last_a = 0, last_b = 0;
+    T last_a = 0, last_b = 0;
     const std::ptrdiff_t dy = size.x(), dz = dy * size.y();
     for (int k = 0; k < size.z(); ++k)
         for (int j = 0; j < size.y(); ++j)
             for (int n = 14; n < 27; ++n) {
                 const int di = n % 3 - 1, dj = n / 3 % 3 - 1, dk = n / 9 - 1;
                 if (j + dj < 0 || j + dj >= size.y() || k + dk >= size.z()) continue;
-                const std::uint32_t* row = labels.data() + dz * k + dy * j;
-                const std::uint32_t* other = row + di + dy * dj + dz * dk;
+                const T* row = labels.data() + dz * k + dy * j;
+                const T* other = row + di + dy * dj + dz * dk;
                 for (int i = std::max(0, -di); i < size.x() - std::max(0, di); ++i) {
                     if (row[i] == other[i] || row[i] == 0 || other[i] == 0 || (row[i] == last_a && other[i] == last_b)) continue;
                     last_a = row[i];
@@ -31,14 +32,13 @@ std::unordered_set<std::uint32_t> touching_labels(std::span<const std::uint32_t>
     return touching;
 }
 
-}  // namespace
-
-std::vector<LabelBox> label_boxes(std::span<const std::uint32_t> labels, const Eigen::Vector3i& size)
+template <class T>
+std::vector<LabelBox> boxes_of(std::span<const T> labels, const Eigen::Vector3i& size)
 {
     std::unordered_map<std::uint32_t, LabelBox> boxes;
     for (int k = 0; k < size.z(); ++k)
         for (int j = 0; j < size.y(); ++j) {
-            const std::uint32_t* row = labels.data() + (std::size_t(k) * std::size_t(size.y()) + std::size_t(j)) * std::size_t(size.x());
+            const T* row = labels.data() + (std::size_t(k) * std::size_t(size.y()) + std::size_t(j)) * std::size_t(size.x());
             for (int i = 0; i < size.x();) {
                 const int begin = i;
                 while (i < size.x() && row[i] == row[begin]) ++i;
@@ -64,16 +64,25 @@ std::vector<LabelBox> label_boxes(std::span<const std::uint32_t> labels, const E
     return out;
 }
 
-Mask cut_out(std::span<const std::uint32_t> labels, const Eigen::Vector3i& size, const Eigen::Vector3d& voxel_size, const LabelBox& box)
+}  // namespace
+
+std::vector<LabelBox> label_boxes(const VoxelValues& labels, const Eigen::Vector3i& size)
+{
+    return labels.visit([&](auto values) { return boxes_of(values, size); });
+}
+
+Mask cut_out(const VoxelValues& labels, const Eigen::Vector3i& size, const Eigen::Vector3d& voxel_size, const LabelBox& box)
 {
     Mask mask = make_mask(box.high - box.low, voxel_size);
     mask.offset = box.low;
-    std::size_t v = 0;
-    for (int k = box.low.z(); k < box.high.z(); ++k)
-        for (int j = box.low.y(); j < box.high.y(); ++j) {
-            const std::uint32_t* row = labels.data() + (std::size_t(k) * std::size_t(size.y()) + std::size_t(j)) * std::size_t(size.x());
-            for (int i = box.low.x(); i < box.high.x(); ++i) mask.voxels[v++] = row[i] == box.label;
-        }
+    labels.visit([&](auto values) {
+        std::size_t v = 0;
+        for (int k = box.low.z(); k < box.high.z(); ++k)
+            for (int j = box.low.y(); j < box.high.y(); ++j) {
+                const auto* row = values.data() + (std::size_t(k) * std::size_t(size.y()) + std::size_t(j)) * std::size_t(size.x());
+                for (int i = box.low.x(); i < box.high.x(); ++i) mask.voxels[v++] = row[i] == box.label;
+            }
+    });
     return mask;
 }
 

@@ -20,10 +20,10 @@ struct LabelBox {
 };
 
 /// Boxes of all labels but 0, by rising label; any ids up to 2^32 - 1.
-std::vector<LabelBox> label_boxes(std::span<const std::uint32_t> labels, const Eigen::Vector3i& size);
+std::vector<LabelBox> label_boxes(const VoxelValues& labels, const Eigen::Vector3i& size);
 
 /// The voxels of one label in their box.
-Mask cut_out(std::span<const std::uint32_t> labels, const Eigen::Vector3i& size, const Eigen::Vector3d& voxel_size, const LabelBox& box);
+Mask cut_out(const VoxelValues& labels, const Eigen::Vector3i& size, const Eigen::Vector3d& voxel_size, const LabelBox& box);
 
 /// One bit per voxel, to keep many masks.
 class PackedMask {

@@ -77,7 +77,7 @@ void read_deflated(std::istream& in, std::size_t total, const std::string& where
 void read_voxels(VoxelStack& stack, std::istream& in, const NumberType& type, bool deflated, const std::string& where)
 {
     VoxelSink sink(stack.name);
-    sink.reserve(stack.count());
+    sink.reserve(stack.count(), type.bytes);
     const auto take = [&](std::span<const std::byte> bytes) { sink.append(bytes, type, where); };
     (deflated ? read_deflated : read_plain)(in, stack.count() * std::size_t(type.bytes), where, take);
     sink.finish(stack);
@@ -248,9 +248,12 @@ VoxelStack read_hdf5(const std::filesystem::path& file, const std::string& datas
         if (s.size() == 1) stack.voxel_size.setConstant(s[0]);
         else if (s.size() == 3) stack.voxel_size = {s[0], s[1], s[2]};
     }
-    const std::vector<double> values = h5.read_doubles(dataset);
+    constexpr std::size_t slab = 16;  // planes at a time: chunks are mostly that deep, and doubles take eight bytes
     VoxelSink sink(stack.name);
-    sink.append(std::as_bytes(std::span(values)), {NumberKind::real, 8}, where);
+    for (std::size_t k = 0; k < dims[0]; k += slab) {
+        const std::vector<double> values = h5.read_doubles(dataset, k, std::min(slab, dims[0] - k));
+        sink.append(std::as_bytes(std::span(values)), {NumberKind::real, 8}, where);
+    }
     sink.finish(stack);
     return stack;
 }

@@ -16,7 +16,7 @@ namespace {
 
 /// Distinct values, rising; counting stops beyond `limit` of them.
 template <class T>
-std::vector<T> distinct_values(const std::vector<T>& values, std::size_t limit)
+std::vector<T> distinct_values(std::span<const T> values, std::size_t limit)
 {
     std::unordered_set<T> seen;
     for (std::size_t v = 0; v < values.size() && seen.size() <= limit; ++v)
@@ -30,11 +30,13 @@ std::vector<T> distinct_values(const std::vector<T>& values, std::size_t limit)
 double roughness(const VoxelStack& stack)
 {
     std::size_t pairs = 0, unequal = 0;
-    for (std::size_t v = 1; v < stack.values.size(); ++v) {
-        if (v % std::size_t(stack.size.x()) == 0 || stack.values[v] == 0 || stack.values[v - 1] == 0) continue;
-        ++pairs;
-        unequal += stack.values[v] != stack.values[v - 1];
-    }
+    stack.values.visit([&](auto values) {
+        for (std::size_t v = 1; v < values.size(); ++v) {
+            if (v % std::size_t(stack.size.x()) == 0 || values[v] == 0 || values[v - 1] == 0) continue;
+            ++pairs;
+            unequal += values[v] != values[v - 1];
+        }
+    });
     return pairs ? double(unequal) / double(pairs) : 0.0;
 }
 
@@ -130,8 +132,11 @@ double otsu_threshold(const VoxelStack& stack)
 Segmentation segment(VoxelStack&& stack, const SegmentationOptions& options)
 {
     constexpr std::size_t level_limit = 1 << 20;
-    const std::vector<std::uint32_t> values = distinct_values(stack.values, level_limit);
-    const std::size_t levels = stack.reals.empty() ? values.size() : distinct_values(stack.reals, level_limit).size();
+    const std::vector<std::uint32_t> values = stack.values.visit([](auto all) {
+        const auto distinct = distinct_values(all, level_limit);
+        return std::vector<std::uint32_t>(distinct.begin(), distinct.end());
+    });
+    const std::size_t levels = stack.reals.empty() ? values.size() : distinct_values(std::span<const float>(stack.reals), level_limit).size();
     if (levels < 2)
         throw Error(stack.name, "every voxel is " + (stack.reals.empty() ? std::to_string(values.at(0)) : to_text(stack.reals.at(0))) + ": there are no grains",
                     "check the export of the stack");

@@ -19,7 +19,7 @@ struct SegmentationOptions {
 struct Segmentation {
     bool binary = false;
     Mask solid;                         ///< when binary
-    std::vector<std::uint32_t> labels;  ///< otherwise: [nz, ny, nx], 0 = void
+    VoxelValues labels;                 ///< otherwise: [nz, ny, nx], 0 = void
     std::string decision;               ///< one line saying how the numbers were taken
 };
 

@@ -68,7 +68,7 @@ VoxelStack read_slices(std::vector<fs::path> slices, const std::string& where)
             if (slice.reals.empty()) stack.reals.insert(stack.reals.end(), slice.values.begin(), slice.values.end());
             else stack.reals.insert(stack.reals.end(), slice.reals.begin(), slice.reals.end());
         } else {
-            stack.values.insert(stack.values.end(), slice.values.begin(), slice.values.end());
+            stack.values.append(slice.values);
         }
         ++stack.size.z();
     }

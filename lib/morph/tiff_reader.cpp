@@ -63,6 +63,7 @@ public:
         stack_.name = std::filesystem::path(file_).filename().string();
         first_ = page_fields();
         check_supported(first_);
+        sink_.reserve(std::size_t(first_.width) * first_.height, std::max(first_.bits / 8, 1));
         read_description();
         int pages = 0;
         const bool single = announced_pages_ > 1 && TIFFNumberOfDirectories(handle_.get()) == 1 && complaint_.text.empty();

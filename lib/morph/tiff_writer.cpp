@@ -19,10 +19,10 @@ struct Closer {
 };
 
 template <class T>
-bool write_rows(TIFF* tiff, const std::uint32_t* slice, int width, int height)
+bool write_slice(TIFF* tiff, const std::vector<std::uint32_t>& slice)
 {
-    std::vector<T> image(std::size_t(width) * std::size_t(height));
-    std::transform(slice, slice + image.size(), image.begin(), [](std::uint32_t v) { return T(v); });
+    std::vector<T> image(slice.size());
+    std::transform(slice.begin(), slice.end(), image.begin(), [](std::uint32_t v) { return T(v); });
     return TIFFWriteEncodedStrip(tiff, 0, image.data(), tmsize_t(image.size() * sizeof(T))) >= 0;
 }
 
@@ -38,7 +38,7 @@ std::string imagej_description(const VoxelStack& stack)
 void write_tiff(const VoxelStack& stack, const std::filesystem::path& file, int bits)
 {
     if (bits != 8 && bits != 16 && bits != 32) throw Error(file.string(), "a TIFF stack has 8, 16 or 32 bits, not " + std::to_string(bits));
-    const std::uint32_t largest = stack.values.empty() ? 0 : *std::max_element(stack.values.begin(), stack.values.end());
+    const std::uint32_t largest = stack.values.largest();
     if (bits < 32 && largest >> bits) throw Error(file.string(), "value " + std::to_string(largest) + " does not fit " + std::to_string(bits) + " bits");
     OutputFile output(file);
     {
@@ -49,6 +49,7 @@ void write_tiff(const VoxelStack& stack, const std::filesystem::path& file, int 
         TIFFOpenOptionsFree(options);
         TIFF* tiff = handle.get();
         bool good = tiff != nullptr;
+        std::vector<std::uint32_t> slice(std::size_t(stack.size.x()) * std::size_t(stack.size.y()));
         for (int k = 0; good && k < stack.size.z(); ++k) {
             TIFFSetField(tiff, TIFFTAG_IMAGEWIDTH, std::uint32_t(stack.size.x()));
             TIFFSetField(tiff, TIFFTAG_IMAGELENGTH, std::uint32_t(stack.size.y()));
@@ -64,10 +65,10 @@ void write_tiff(const VoxelStack& stack, const std::filesystem::path& file, int 
                 TIFFSetField(tiff, TIFFTAG_RESOLUTIONUNIT, std::uint16_t(RESUNIT_NONE));
             }
             if (k == 0) TIFFSetField(tiff, TIFFTAG_IMAGEDESCRIPTION, imagej_description(stack).c_str());
-            const std::uint32_t* slice = &stack.values[stack.index(0, 0, k)];
-            if (bits == 8) good = write_rows<std::uint8_t>(tiff, slice, stack.size.x(), stack.size.y());
-            else if (bits == 16) good = write_rows<std::uint16_t>(tiff, slice, stack.size.x(), stack.size.y());
-            else good = write_rows<std::uint32_t>(tiff, slice, stack.size.x(), stack.size.y());
+            stack.values.read(stack.index(0, 0, k), slice);
+            if (bits == 8) good = write_slice<std::uint8_t>(tiff, slice);
+            else if (bits == 16) good = write_slice<std::uint16_t>(tiff, slice);
+            else good = write_slice<std::uint32_t>(tiff, slice);
             good = good && TIFFWriteDirectory(tiff);
         }
         if (!good) throw Error(file.string(), "cannot be written", "check the free space of the disk");

@@ -20,11 +20,26 @@ T load(const std::byte* p, bool swapped)
 }
 
 template <class T>
-void append_unsigned(std::vector<std::uint32_t>& out, std::span<const std::byte> bytes, bool swapped)
+void append_unsigned(VoxelValues& out, std::span<const std::byte> bytes, bool swapped)
 {
-    const std::size_t n = bytes.size() / sizeof(T), first = out.size();
-    out.resize(first + n);
-    for (std::size_t i = 0; i < n; ++i) out[first + i] = load<T>(bytes.data() + i * sizeof(T), swapped);
+    constexpr std::size_t piece = 1 << 16;
+    std::vector<T> values;
+    for (std::size_t done = 0; done < bytes.size() / sizeof(T); done += values.size()) {
+        values.resize(std::min(piece, bytes.size() / sizeof(T) - done));
+        for (std::size_t i = 0; i < values.size(); ++i) values[i] = load<T>(bytes.data() + (done + i) * sizeof(T), swapped);
+        out.append(std::span<const T>(values));
+    }
+}
+
+std::int64_t load_integer(const std::byte* p, const NumberType& type)
+{
+    const bool is_signed = type.kind == NumberKind::signed_integer;
+    switch (type.bytes) {
+        case 1: return is_signed ? std::int64_t(load<std::int8_t>(p, false)) : load<std::uint8_t>(p, false);
+        case 2: return is_signed ? std::int64_t(load<std::int16_t>(p, type.swapped)) : load<std::uint16_t>(p, type.swapped);
+        case 4: return is_signed ? std::int64_t(load<std::int32_t>(p, type.swapped)) : load<std::uint32_t>(p, type.swapped);
+        default: return load<std::int64_t>(p, type.swapped);
+    }
 }
 
 }  // namespace
@@ -34,12 +49,13 @@ void VoxelSink::append_real(double value, const std::string& where)
     if (!std::isfinite(value)) throw Error(where, "voxel " + std::to_string(count()) + " is not a number", "repair the stack before use");
     const bool integral = value >= 0 && value <= 4294967295.0 && value == std::floor(value);
     if (!real_ && !integral) {
+        flush();
         real_ = true;
         reals_.assign(values_.begin(), values_.end());
         values_ = {};
     }
     if (real_) reals_.push_back(float(value));
-    else values_.push_back(std::uint32_t(value));
+    else pending_.push_back(std::uint32_t(value));
 }
 
 void VoxelSink::append(std::span<const std::byte> bytes, const NumberType& type, const std::string& where)
@@ -52,27 +68,32 @@ void VoxelSink::append(std::span<const std::byte> bytes, const NumberType& type,
         return;
     }
     for (const std::byte* p = bytes.data(); p + size <= bytes.data() + bytes.size(); p += size) {
-        if (type.kind == NumberKind::real) {
-            append_real(type.bytes == 4 ? double(load<float>(p, type.swapped)) : load<double>(p, type.swapped), where);
-            continue;
-        }
-        std::int64_t value = 0;
-        const bool is_signed = type.kind == NumberKind::signed_integer;
-        if (type.bytes == 1) value = is_signed ? load<std::int8_t>(p, false) : load<std::uint8_t>(p, false);
-        else if (type.bytes == 2) value = is_signed ? load<std::int16_t>(p, type.swapped) : load<std::uint16_t>(p, type.swapped);
-        else if (type.bytes == 4) value = is_signed ? load<std::int32_t>(p, type.swapped) : load<std::uint32_t>(p, type.swapped);
-        else value = load<std::int64_t>(p, type.swapped);
-        if (value < 0 || value > 4294967295LL)
-            throw Error(where, "voxel " + std::to_string(count()) + " is " + std::to_string(value) + ", outside 0..4294967295",
-                        "shift the grey values, or save labels as unsigned integers");
-        if (real_) reals_.push_back(float(value));
-        else values_.push_back(std::uint32_t(value));
+        if (pending_.size() == pending_limit) flush();
+        if (type.kind == NumberKind::real) append_real(type.bytes == 4 ? double(load<float>(p, type.swapped)) : load<double>(p, type.swapped), where);
+        else append_integer(load_integer(p, type), where);
     }
+    flush();
+}
+
+void VoxelSink::append_integer(std::int64_t value, const std::string& where)
+{
+    if (value < 0 || value > 4294967295LL)
+        throw Error(where, "voxel " + std::to_string(count()) + " is " + std::to_string(value) + ", outside 0..4294967295",
+                    "shift the grey values, or save labels as unsigned integers");
+    if (real_) reals_.push_back(float(value));
+    else pending_.push_back(std::uint32_t(value));
 }
 
 void VoxelSink::append_bits(std::span<const std::byte> row, int width)
 {
-    for (int i = 0; i < width; ++i) values_.push_back(std::uint32_t(row[std::size_t(i / 8)] >> (7 - i % 8)) & 1U);
+    for (int i = 0; i < width; ++i) pending_.push_back(std::uint32_t(row[std::size_t(i / 8)] >> (7 - i % 8)) & 1U);
+    flush();
+}
+
+void VoxelSink::flush()
+{
+    values_.append(std::span<const std::uint32_t>(pending_));
+    pending_.clear();
 }
 
 void VoxelSink::finish(VoxelStack& stack)

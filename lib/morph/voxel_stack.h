@@ -8,13 +8,15 @@
 #include <string>
 #include <vector>
 
+#include "morph/voxel_values.h"
+
 namespace coral::morph {
 
 /// Integer voxels (grey values, masks or labels), or real grey values when the file holds fractions.
 struct VoxelStack {
     Eigen::Vector3i size = Eigen::Vector3i::Zero();          ///< voxels along x, y, z
     Eigen::Vector3d voxel_size = Eigen::Vector3d::Zero();    ///< edges of a voxel [m]; zero when the file does not say
-    std::vector<std::uint32_t> values;                       ///< [nz, ny, nx]; empty when `reals` is used
+    VoxelValues values;                                      ///< [nz, ny, nx]; empty when `reals` is used
     std::vector<float> reals;                                ///< [nz, ny, nx]; grey values of a floating-point file
     std::string name;                                        ///< file or folder the voxels came from, for messages
 

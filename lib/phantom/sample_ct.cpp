@@ -137,7 +137,7 @@ Sample make_sample(const SampleSpec& spec)
     const auto corners = place(images, static_cast<int>(std::ceil(spec.gap)), spec.touching, labels.size);
     labels.voxel_size = spec.voxel_size;
     labels.name = "phantom";
-    labels.values.assign(labels.count(), 0);
+    labels.values = morph::VoxelValues(labels.count(), 0);
     sample.fraction.assign(labels.count(), 0.0f);
     for (int n = 0; n < spec.grains; ++n) {
         const GrainImage& image = images[n];
@@ -147,7 +147,7 @@ Sample make_sample(const SampleSpec& spec)
             for (int j = 0; j < image.size.y(); ++j) {
                 for (int i = 0; i < image.size.x(); ++i, ++from) {
                     const std::size_t to = labels.index(corners[n].x() + i, corners[n].y() + j, corners[n].z() + k);
-                    if (image.solid[from]) labels.values[to] = static_cast<std::uint32_t>(n + 1);
+                    if (image.solid[from]) labels.values.set(to, static_cast<std::uint32_t>(n + 1));
                     sample.fraction[to] = std::min(1.0f, sample.fraction[to] + image.fraction[from]);
                 }
             }
@@ -193,7 +193,7 @@ Table truth_table(const Sample& sample)
 morph::VoxelStack binary_stack(const Sample& sample)
 {
     morph::VoxelStack stack = sample.labels;
-    for (auto& value : stack.values) value = value ? 255 : 0;
+    for (std::size_t v = 0; v < stack.count(); ++v) stack.values.set(v, stack.values[v] ? 255 : 0);
     return stack;
 }
 
@@ -206,7 +206,7 @@ morph::VoxelStack grey_stack(const Sample& sample, const GreySpec& spec, std::ui
         for (std::size_t n = begin; n < end; ++n) {
             const double grey =
                 spec.void_grey + (spec.solid_grey - spec.void_grey) * sample.fraction[n] + spec.noise * random.normal();
-            stack.values[n] = static_cast<std::uint32_t>(std::clamp(std::lround(grey), 0L, 255L));
+            stack.values.set(n, static_cast<std::uint32_t>(std::clamp(std::lround(grey), 0L, 255L)));
         }
     });
     return stack;

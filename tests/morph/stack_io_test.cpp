@@ -157,7 +157,9 @@ TEST_F(StackIo, slices_come_in_natural_order)
     for (int k = 0; k < 12; ++k) {
         VoxelStack slice;
         slice.size = {37, 23, 1};
-        slice.values.assign(whole.values.begin() + std::ptrdiff_t(whole.index(0, 0, k)), whole.values.begin() + std::ptrdiff_t(whole.index(0, 0, k)) + 37 * 23);
+        std::vector<std::uint32_t> values(37 * 23);
+        whole.values.read(whole.index(0, 0, k), values);
+        slice.values = values;
         write_tiff(slice, folder_ / ("scan_" + std::to_string(k + 1) + ".tif"), 8);
     }
     EXPECT_EQ(read(folder_).values, whole.values);

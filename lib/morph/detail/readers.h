@@ -1,6 +1,7 @@
 #pragma once
 /// \file morph/detail/readers.h
 /// Readers of single files, behind morph/stack_io.h.
+#include <algorithm>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
@@ -25,18 +26,23 @@ struct NumberType {
 class VoxelSink {
 public:
     explicit VoxelSink(std::string name) : name_(std::move(name)) {}
-    void reserve(std::size_t voxels) { values_.reserve(voxels); }
+    /// Room for the voxels, in the width of the file's numbers; two bytes at first for wider ones, which mostly hold small numbers.
+    void reserve(std::size_t voxels, int bytes) { values_.reserve(voxels, std::min(bytes, 2)); }
     /// \throws Error on a negative, infinite or NaN number, naming voxel and `where`
     void append(std::span<const std::byte> bytes, const NumberType& type, const std::string& where);
     void append_bits(std::span<const std::byte> row, int width);  ///< packed, most significant bit first
-    std::size_t count() const { return real_ ? reals_.size() : values_.size(); }
+    std::size_t count() const { return real_ ? reals_.size() : values_.size() + pending_.size(); }
     /// Moves the voxels into `stack`. \throws Error when the count is not the stack's
     void finish(VoxelStack& stack);
 
 private:
+    static constexpr std::size_t pending_limit = 1 << 16;
     void append_real(double value, const std::string& where);
+    void append_integer(std::int64_t value, const std::string& where);
+    void flush();
     std::string name_;
-    std::vector<std::uint32_t> values_;
+    VoxelValues values_;
+    std::vector<std::uint32_t> pending_;  ///< integers that wait for flush()
     std::vector<float> reals_;
     bool real_ = false;
 };
