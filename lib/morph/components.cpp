@@ -10,7 +10,7 @@ namespace {
 
 struct Run {
     int begin, end;       ///< x range [begin, end)
-    std::uint32_t label;  ///< provisional label: number of the run itself
+    std::uint32_t label;  ///< number of the run itself, then of its component
 };
 
 std::uint32_t find_root(std::vector<std::uint32_t>& parent, std::uint32_t a)
@@ -79,19 +79,23 @@ Components connected_components(std::span<const std::uint8_t> voxels, const Eige
         }
 
     Components out;
-    out.labels.assign(rows * std::size_t(nx), 0);
-    std::vector<std::uint32_t> number(runs.size(), 0);
-    for (std::size_t r = 0; r < rows; ++r)
-        for (std::size_t i = first[r]; i < first[r + 1]; ++i) {
-            const std::uint32_t root = find_root(parent, std::uint32_t(i));
-            if (number[root] == 0) {
-                out.sizes.push_back(0);
-                number[root] = std::uint32_t(out.sizes.size());
-            }
-            const Run& run = runs[i];
-            out.sizes[number[root] - 1] += std::size_t(run.end - run.begin);
-            std::fill_n(out.labels.begin() + std::ptrdiff_t(r * std::size_t(nx)) + run.begin, run.end - run.begin, number[root]);
+    for (std::size_t i = 0; i < runs.size(); ++i) {
+        const std::uint32_t root = find_root(parent, std::uint32_t(i));  // a root comes before its other runs
+        if (root == i) {
+            out.sizes.push_back(0);
+            runs[i].label = std::uint32_t(out.sizes.size());
+        } else {
+            runs[i].label = runs[root].label;
         }
+        out.sizes[runs[i].label - 1] += std::size_t(runs[i].end - runs[i].begin);
+    }
+    out.labels.reserve(rows * std::size_t(nx), out.sizes.size() > 65535 ? 4 : out.sizes.size() > 255 ? 2 : 1);
+    std::vector<std::uint32_t> line;
+    for (std::size_t r = 0; r < rows; ++r) {
+        line.assign(std::size_t(nx), 0);
+        for (std::size_t i = first[r]; i < first[r + 1]; ++i) std::fill(line.begin() + runs[i].begin, line.begin() + runs[i].end, runs[i].label);
+        out.labels.append(std::span<const std::uint32_t>(line));
+    }
     return out;
 }
 

@@ -13,8 +13,8 @@ namespace coral::morph {
 enum class Connectivity { faces = 6, full = 26 };
 
 struct Components {
-    std::vector<std::uint32_t> labels;  ///< [nz, ny, nx], 0 = not of the value asked for; numbered 1.. by first voxel in memory order
-    std::vector<std::size_t> sizes;     ///< voxels of component l at sizes[l - 1]
+    VoxelValues labels;              ///< [nz, ny, nx], 0 = not of the value asked for; numbered 1.. by first voxel in memory order
+    std::vector<std::size_t> sizes;  ///< voxels of component l at sizes[l - 1]
 };
 
 /// Components of the voxels equal to `value`, by union-find over runs of x.

@@ -169,6 +169,8 @@ Segmentation segment(VoxelStack&& stack, const SegmentationOptions& options)
         out.decision = std::to_string(grains) + " labels; 0 is void";
     }
     if (out.binary) {
+        stack.values = {};
+        stack.reals = {};
         const std::size_t solid = solid_count(out.solid);
         if (solid == 0 || solid == out.solid.count())
             throw Error(stack.name, solid == 0 ? "no voxel is solid (" + out.decision + ")" : "every voxel is solid (" + out.decision + ")",
