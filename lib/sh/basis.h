@@ -29,10 +29,14 @@ public:
     double sum(std::span<const double> coefficients, const Eigen::Vector3d& u) const;
     /// The same, and its gradient on the unit sphere (tangential).
     double sum(std::span<const double> coefficients, const Eigen::Vector3d& u, Eigen::Vector3d& gradient) const;
+    /// The same, and its second covariant derivative on the unit sphere: symmetric, tangential in both directions.
+    double sum(std::span<const double> coefficients, const Eigen::Vector3d& u, Eigen::Vector3d& gradient, Eigen::Matrix3d& hessian) const;
 
 private:
     template <bool with_gradient, class Visit>
     void visit(int degree, const Eigen::Vector3d& u, const Visit& take) const;
+    template <int order>
+    double polynomial(std::span<const double> coefficients, const Eigen::Vector3d& u, Eigen::Vector3d& gradient, Eigen::Matrix3d& hessian) const;
 
     int degree_;
     std::vector<double> diagonal_, first_, second_;  // factors of the three-term recurrence in l

@@ -11,6 +11,7 @@
 #include "sdf/mass_properties.h"
 #include "sdf/mesh.h"
 #include "sh/quadrature.h"
+#include "sh/surface_distance.h"
 
 namespace coral::sh {
 namespace {
@@ -137,12 +138,11 @@ FitErrors FitReference::errors(const Surface& surface, const RadialSamples& samp
         const double r = evaluator.radius(u, gradient);
         forth.add(std::abs(impl_->grid.sample(surface.centre + r * u)), quadrature.weights[i] * r * std::sqrt(r * r + gradient.squaredNorm()));
     }
-    // Level set -> harmonic surface: closest point, started in the same direction.
+    // Level set -> harmonic surface: the nearest point of the whole surface, since that in the same direction is not the nearest
+    // where the grain bends back.
+    const SurfaceDistance harmonic(surface);
     Spread back;
-    for (std::size_t n = 0; n < impl_->points.size(); ++n) {
-        Eigen::Vector3d p = impl_->points[n];
-        back.add(evaluator.closest_point(impl_->points[n], p), impl_->shares[n]);
-    }
+    for (std::size_t n = 0; n < impl_->points.size(); ++n) back.add(std::abs(harmonic.distance(impl_->points[n])), impl_->shares[n]);
 
     FitErrors e;
     e.rms_error = std::sqrt(0.5 * (forth.squares / forth.weight + back.squares / back.weight)) / impl_->diameter;

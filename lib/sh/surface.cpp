@@ -46,34 +46,6 @@ double Evaluator::radial_distance(const Eigen::Vector3d& x) const
     return length > 0 ? length - radius(d / length) : -radius(Eigen::Vector3d::UnitZ());
 }
 
-double Evaluator::closest_point(const Eigen::Vector3d& x, Eigen::Vector3d& p, int steps) const
-{
-    Eigen::Vector3d normal;
-    p = point((p - surface_.centre).normalized(), normal);
-    double best = (x - p).squaredNorm(), stride = 1.0;  // stride: step per tangential residual, 1 on a flat surface
-    for (int n = 0; n < steps; ++n) {
-        const Eigen::Vector3d r = x - p, residual = r - r.dot(normal) * normal;
-        const double length = residual.norm();
-        if (length * length < 1e-10 * best || length == 0) break;
-        const double step = std::min(stride * length, 0.3 * (p - surface_.centre).norm());
-        const Eigen::Vector3d direction = residual / length, towards = p + step * direction - surface_.centre;
-        if (towards.squaredNorm() == 0) break;
-        Eigen::Vector3d q_normal;
-        const Eigen::Vector3d q = point(towards.normalized(), q_normal), s = x - q;
-        // What is left of the residual after the step tells the stride on this curvature (secant).
-        const double left = (s - s.dot(q_normal) * q_normal).dot(direction);
-        stride = std::clamp(length - left > 0 ? step / (length - left) : 2.0, 0.02, 4.0);
-        if (s.squaredNorm() < best) {
-            best = s.squaredNorm();
-            p = q;
-            normal = q_normal;
-        } else {
-            stride = std::min(stride, 0.5 * step / length);
-        }
-    }
-    return std::sqrt(best);
-}
-
 BodyProperties body_properties(const Surface& surface)
 {
     const Evaluator evaluator(surface);

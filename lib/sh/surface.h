@@ -32,14 +32,14 @@ public:
     double radius(const Eigen::Vector3d& u) const { return basis_.sum(surface_.coefficients, u); }
     /// Radius and its gradient on the unit sphere.
     double radius(const Eigen::Vector3d& u, Eigen::Vector3d& gradient) const { return basis_.sum(surface_.coefficients, u, gradient); }
+    /// Radius, its gradient and its second covariant derivative on the unit sphere.
+    double radius(const Eigen::Vector3d& u, Eigen::Vector3d& gradient, Eigen::Matrix3d& hessian) const { return basis_.sum(surface_.coefficients, u, gradient, hessian); }
     /// Surface point in direction u, in the grain's frame [m].
     Eigen::Vector3d point(const Eigen::Vector3d& u) const { return surface_.centre + radius(u) * u; }
     /// The same with the outward unit normal, (r u - grad r) normalised.
     Eigen::Vector3d point(const Eigen::Vector3d& u, Eigen::Vector3d& normal) const;
-    /// |x - centre| - r(u): sign is exact (negative inside), the value is a distance only on a sphere [m].
+    /// |x - centre| - r(u): sign is exact (negative inside), the value is a distance only on a sphere [m]; sh/surface_distance.h has that.
     double radial_distance(const Eigen::Vector3d& x) const;
-    /// Surface point nearest to x near the guess `p` (tangential steps, accepted while nearer); moves p, returns |x - p|.
-    double closest_point(const Eigen::Vector3d& x, Eigen::Vector3d& p, int steps = 12) const;
 
 private:
     Surface surface_;

@@ -74,6 +74,37 @@ TEST(Basis, sum_of_fewer_coefficients_is_that_of_the_lower_degree)
     EXPECT_NEAR(Basis(9).sum(c, u), Basis(1).sum(c, u), 1e-15);
 }
 
+TEST(Basis, sum_has_the_derivatives_of_its_harmonics)
+{
+    const int degree = 9;
+    std::mt19937_64 random(3);
+    std::normal_distribution<double> normal;
+    std::vector<double> c(std::size_t(coefficient_count(degree))), y(c.size());
+    std::vector<Eigen::Vector3d> gradients(c.size());
+    for (double& value : c) value = normal(random);
+    const Basis basis(degree);
+    std::vector<Eigen::Vector3d> directions = {{0, 0, 1}, {0, 0, -1}, {1, 0, 0}, {0, -1, 0}};
+    for (int n = 0; n < 10; ++n) directions.push_back(Eigen::Vector3d(normal(random), normal(random), normal(random)).normalized());
+    for (const Eigen::Vector3d& u : directions) {
+        Eigen::Vector3d gradient;
+        Eigen::Matrix3d hessian;
+        const double value = basis.sum(c, u, gradient, hessian);
+        basis.evaluate(u, y, gradients);
+        double sum = 0;
+        Eigen::Vector3d slope = Eigen::Vector3d::Zero();
+        for (std::size_t k = 0; k < c.size(); ++k) sum += c[k] * y[k], slope += c[k] * gradients[k];
+        EXPECT_NEAR(value, sum, 1e-13);
+        EXPECT_LE((gradient - slope).norm(), 1e-12);
+        EXPECT_LE((hessian * u).norm(), 1e-11) << "not tangential";
+        // Second difference along the great circle through u in direction t is t.H.t.
+        for (const Eigen::Vector3d& t : {u.unitOrthogonal(), Eigen::Vector3d(u.cross(u.unitOrthogonal())), Eigen::Vector3d((u.unitOrthogonal() + u.cross(u.unitOrthogonal())).normalized())}) {
+            const double step = 1e-4;
+            const auto at = [&](double s) { return basis.sum(c, std::cos(s) * u + std::sin(s) * t); };
+            EXPECT_NEAR(t.dot(hessian * t), (at(step) - 2 * at(0) + at(-step)) / step / step, 2e-4);
+        }
+    }
+}
+
 TEST(GaussLegendre, integrates_polynomials_of_degree_2n_minus_1)
 {
     for (const int n : {1, 2, 11, 44, 101}) {

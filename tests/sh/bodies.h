@@ -4,6 +4,7 @@
 #include <random>
 
 #include "sdf/distance_grid.h"
+#include "sh/quadrature.h"
 #include "sh/surface.h"
 
 namespace coral::sh::test {
@@ -19,6 +20,19 @@ inline Surface lump(int degree, double roughness, unsigned seed)
     surface.coefficients[0] = std::sqrt(4 * std::numbers::pi);
     for (int l = 2; l <= degree; ++l)
         for (int m = -l; m <= l; ++m) surface.coefficients[std::size_t(coefficient_index(l, m))] = roughness * normal(random) / std::pow(l, 1.5);
+    return surface;
+}
+
+/// Ellipsoid with semi-axes 1.3, 1, 0.8, analysed to a degree that holds its radii to 1e-8.
+inline Surface ellipsoid()
+{
+    const int degree = 30;
+    const SphereQuadrature q = oversampled_quadrature(degree);
+    std::vector<double> radii;
+    for (const auto& u : q.directions) radii.push_back(1 / std::sqrt(std::pow(u.x() / 1.3, 2) + std::pow(u.y(), 2) + std::pow(u.z() / 0.8, 2)));
+    Surface surface;
+    surface.degree = degree;
+    surface.coefficients = analyse(q, radii, degree);
     return surface;
 }
 

@@ -11,19 +11,6 @@ namespace {
 
 const double pi = std::numbers::pi;
 
-/// Radii of an ellipsoid with semi-axes 1.3, 1, 0.8, analysed to a degree that holds them to 1e-8.
-Surface ellipsoid()
-{
-    const int degree = 30;
-    const SphereQuadrature q = oversampled_quadrature(degree);
-    std::vector<double> radii;
-    for (const auto& u : q.directions) radii.push_back(1 / std::sqrt(std::pow(u.x() / 1.3, 2) + std::pow(u.y(), 2) + std::pow(u.z() / 0.8, 2)));
-    Surface surface;
-    surface.degree = degree;
-    surface.coefficients = analyse(q, radii, degree);
-    return surface;
-}
-
 TEST(BodyProperties, of_an_ellipsoid_are_the_closed_forms)
 {
     const double a = 1.3, b = 1.0, c = 0.8, v = 4.0 / 3.0 * pi * a * b * c;
@@ -70,18 +57,6 @@ TEST(Evaluator, normal_is_perpendicular_to_the_surface)
     for (const Eigen::Vector3d& step : {Eigen::Vector3d(1e-6, 0, 0), Eigen::Vector3d(0, 1e-6, 0)})
         EXPECT_NEAR(normal.dot((lumpy.point((u + step).normalized()) - p).normalized()), 0.0, 1e-5);
     EXPECT_GT(normal.dot(u), 0.0);
-}
-
-TEST(Evaluator, closest_point_of_an_ellipsoid_has_the_query_on_its_normal)
-{
-    const Evaluator evaluator(ellipsoid());
-    for (const double d : {-0.1, 0.05, 0.4, 2.0}) {
-        Eigen::Vector3d normal;
-        const Eigen::Vector3d foot = evaluator.point(Eigen::Vector3d(0.6, -0.5, 0.4).normalized(), normal), x = foot + d * normal;
-        Eigen::Vector3d p = x;
-        EXPECT_NEAR(evaluator.closest_point(x, p, 40), std::abs(d), 1e-5) << d;
-        EXPECT_NEAR((p - foot).norm(), 0.0, 2e-3) << d;
-    }
 }
 
 TEST(Evaluator, refuses_coefficients_that_do_not_fit)
