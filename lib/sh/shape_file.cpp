@@ -39,6 +39,7 @@ ShapeRecord read_shape(const H5File& file, const std::string& group, int id)
     shape.surface.centre = Eigen::Vector3d(centre[0], centre[1], centre[2]);
     shape.surface.scale = file.number_attribute(group, "scale");
     shape.surface.method = file.string_attribute(group, "method");
+    if (file.has_attribute(group, "name")) shape.name = file.string_attribute(group, "name");
     shape.volume = file.number_attribute(group, "volume");
     shape.solid_volume = file.number_attribute(group, "solid_volume");
     shape.equivalent_diameter = file.number_attribute(group, "equivalent_diameter");
@@ -65,6 +66,7 @@ void write_shapes(const std::filesystem::path& path, std::span<const ShapeRecord
         file.set_attribute(group, "centre", std::span<const double>(shape->surface.centre.data(), 3));
         file.set_attribute(group, "scale", shape->surface.scale);
         file.set_attribute(group, "method", shape->surface.method);
+        if (!shape->name.empty()) file.set_attribute(group, "name", shape->name);
         file.set_attribute(group, "volume", shape->volume);
         file.set_attribute(group, "solid_volume", shape->solid_volume);
         file.set_attribute(group, "equivalent_diameter", shape->equivalent_diameter);
