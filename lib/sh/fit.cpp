@@ -7,7 +7,6 @@
 
 #include "core/error.h"
 #include "core/text.h"
-#include "sdf/extend.h"
 #include "sdf/mass_properties.h"
 #include "sdf/mesh.h"
 #include "sh/quadrature.h"
@@ -94,11 +93,24 @@ Surface fit(const RadialSamples& samples, int degree, double volume)
 }
 
 struct FitReference::Impl {
-    sdf::DistanceGrid grid;  // every node a distance, out to a quarter of the equivalent diameter beyond the surface
+    sdf::DistanceGrid grid;
     double diameter = 0, area = 0;
     sdf::MassProperties body;
     std::vector<Eigen::Vector3d> points;  // surface samples of the level set
     std::vector<double> shares;           // their areas
+    Eigen::Matrix3Xf vertices;            // all of its mesh
+
+    /// Distance of a point to the surface of the level set, without sign. Beyond the band, where the grid is clamped, that to the
+    /// nearest vertex: vertices lie within a node of each other, so at a band of 6 nodes it errs by a hundredth of a node.
+    double distance(const Eigen::Vector3d& x) const
+    {
+        if (grid.inside_box(x)) {
+            const double margin = std::numbers::sqrt3 * grid.spacing;  // no corner of the cell is clamped
+            const double d = grid.sample(x);
+            if (d < grid.outside_limit - margin && d > margin - grid.inside_limit) return std::abs(d);
+        }
+        return std::sqrt(double((vertices.colwise() - x.cast<float>()).colwise().squaredNorm().minCoeff()));
+    }
 };
 
 FitReference::FitReference(const sdf::DistanceGrid& grid) : impl_(new Impl)
@@ -106,9 +118,11 @@ FitReference::FitReference(const sdf::DistanceGrid& grid) : impl_(new Impl)
     impl_->body = sdf::mass_properties(grid);
     if (!(impl_->body.volume > 0)) throw Error("radial fit", "the grid has no solid");
     impl_->diameter = std::cbrt(6.0 * impl_->body.volume / std::numbers::pi);
-    impl_->grid = sdf::extended(grid, 0.25 * impl_->diameter);
+    impl_->grid = grid;
     const sdf::TriangleMesh mesh = sdf::extract_mesh(grid);
     impl_->area = sdf::surface_area(mesh);
+    impl_->vertices.resize(3, Eigen::Index(mesh.vertices.size()));
+    for (std::size_t n = 0; n < mesh.vertices.size(); ++n) impl_->vertices.col(Eigen::Index(n)) = mesh.vertices[n].cast<float>();
     const std::size_t every = std::max<std::size_t>(1, mesh.triangles.size() / 8000);
     for (std::size_t t = 0; t < mesh.triangles.size(); t += every) {
         const Eigen::Vector3i& triangle = mesh.triangles[t];
@@ -129,14 +143,14 @@ FitErrors FitReference::errors(const Surface& surface, const RadialSamples& samp
         throw Error("radial fit", "degree " + std::to_string(surface.degree) + " gives a radius that is not positive", "take another degree");
     const Evaluator evaluator(surface);
 
-    // Harmonic surface -> level set: the extended grid holds the distance.
+    // Harmonic surface -> level set.
     Spread forth;
     const SphereQuadrature quadrature = oversampled_quadrature(std::max(surface.degree, 10));
     for (std::size_t i = 0; i < quadrature.weights.size(); ++i) {
         Eigen::Vector3d gradient;
         const Eigen::Vector3d& u = quadrature.directions[i];
         const double r = evaluator.radius(u, gradient);
-        forth.add(std::abs(impl_->grid.sample(surface.centre + r * u)), quadrature.weights[i] * r * std::sqrt(r * r + gradient.squaredNorm()));
+        forth.add(impl_->distance(surface.centre + r * u), quadrature.weights[i] * r * std::sqrt(r * r + gradient.squaredNorm()));
     }
     // Level set -> harmonic surface: the nearest point of the whole surface, since that in the same direction is not the nearest
     // where the grain bends back.

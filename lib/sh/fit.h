@@ -37,7 +37,7 @@ struct FitErrors {
     double non_star_fraction = 0.0;
 };
 
-/// What the errors of all degrees share: the level set extended, its mesh and its mass properties. Thread-safe when const.
+/// What the errors of all degrees share: the level set, its mesh and its mass properties. Thread-safe when const.
 class FitReference {
 public:
     explicit FitReference(const sdf::DistanceGrid& grid);
