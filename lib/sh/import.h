@@ -81,8 +81,7 @@ struct ImportedSet {
     std::vector<ImportedShape> shapes;  ///< ids from 1 in the order of the files; a folder stands for its .dat files by name
     std::size_t left_out = 0;           ///< rows without size
     std::size_t too_slender = 0;        ///< ellipsoids that the degree cannot hold
-    std::size_t without_figures = 0;    ///< coefficient sets that no table names, when there is a table
-    bool has_table = false;             ///< a table of figures was among the files
+    std::vector<std::string> without_unit;  ///< sets of a folder that no table names: their unit is not known, they are left out
 };
 
 /// Reads coefficient sets and axes tables, in any order, and compares with the figures of the TSQUARE tables among the files.

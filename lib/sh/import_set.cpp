@@ -15,19 +15,30 @@ namespace fs = std::filesystem;
 
 constexpr int ellipsoid_degree = 10;
 
+/// A coefficient set or an axes table.
+struct ShapeSource {
+    fs::path file;
+    PublishedFormat format;
+    bool from_folder;  ///< not named by the user
+};
+
 /// Files of each format, folders opened.
 struct Sorted {
-    std::vector<fs::path> shapes;  ///< coefficient sets and axes tables, as given
-    std::vector<PublishedFormat> formats;
+    std::vector<ShapeSource> shapes;  ///< as given
     std::vector<fs::path> tables;
 };
 
 Sorted sort_files(const std::vector<fs::path>& files)
 {
-    std::vector<fs::path> all;
+    Sorted sorted;
+    const auto take = [&sorted](const fs::path& file, bool from_folder) {
+        const PublishedFormat format = published_format(file);
+        if (format == PublishedFormat::tsquare_table) sorted.tables.push_back(file);
+        else sorted.shapes.push_back({file, format, from_folder});
+    };
     for (const fs::path& file : files) {
         if (!fs::is_directory(file)) {
-            all.push_back(file);
+            take(file, false);
             continue;
         }
         std::vector<fs::path> inside;
@@ -35,35 +46,21 @@ Sorted sort_files(const std::vector<fs::path>& files)
             if (entry.is_regular_file() && entry.path().extension() == ".dat") inside.push_back(entry.path());
         if (inside.empty()) throw Error(file.string(), "holds no .dat file", "name the files to import");
         std::ranges::sort(inside);
-        all.insert(all.end(), inside.begin(), inside.end());
-    }
-    Sorted sorted;
-    for (const fs::path& file : all) {
-        const PublishedFormat format = published_format(file);
-        if (format == PublishedFormat::tsquare_table) {
-            sorted.tables.push_back(file);
-        } else {
-            sorted.shapes.push_back(file);
-            sorted.formats.push_back(format);
-        }
+        for (const fs::path& one : inside) take(one, true);
     }
     return sorted;
 }
 
-/// Unit of the coefficient sets [m]: the option's, else the table's. With --scale-to any unit does.
+/// Unit of the sets that the tables name [m]: the option's, else the tables'; 0 when neither says it.
 double unit_of(const Sorted& sorted, const ImportOptions& options)
 {
     double unit = options.unit;
     for (const fs::path& table : sorted.tables) {
         const double named = tsquare_table_unit(table);
         if (named > 0 && unit > 0 && std::abs(named / unit - 1) > 1e-12)
-            throw UsageError(table.string(), "says that a unit is " + format_quantity(named, Dimension::length) + ", not " + format_quantity(unit, Dimension::length), "leave out --unit");
+            throw UsageError(table.string(), "says that a unit is " + format_quantity(named, Dimension::length) + ", not " + format_quantity(unit, Dimension::length), "leave out --unit, or import one project at a time");
         if (unit == 0) unit = named;
     }
-    if (unit == 0 && options.scale_to > 0) unit = 1;
-    for (std::size_t n = 0; n < sorted.shapes.size() && unit == 0; ++n)
-        if (sorted.formats[n] == PublishedFormat::tsquare_coefficients)
-            throw UsageError(sorted.shapes[n].string(), "does not say the unit of its lengths", "give it, as in --unit 1mm, or a size, as in --scale-to 5mm");
     return unit;
 }
 
@@ -123,23 +120,26 @@ ImportedSet import_shapes(const std::vector<fs::path>& files, const ImportOption
     std::map<std::string, PublishedFigures> table;
     for (const fs::path& file : sorted.tables) table.merge(read_tsquare_table(file, unit));
     ImportedSet set;
-    set.has_table = !sorted.tables.empty();
     std::vector<PublishedShape> published;
-    for (std::size_t n = 0; n < sorted.shapes.size(); ++n) {
-        const fs::path& file = sorted.shapes[n];
-        if (sorted.formats[n] == PublishedFormat::sand_atlas_table) {
-            AxesTable axes = read_sand_atlas(file, options.degree > 0 ? options.degree : ellipsoid_degree);
+    for (const ShapeSource& source : sorted.shapes) {
+        if (source.format == PublishedFormat::sand_atlas_table) {
+            AxesTable axes = read_sand_atlas(source.file, options.degree > 0 ? options.degree : ellipsoid_degree);
             set.left_out += axes.left_out;
             set.too_slender += axes.too_slender;
             std::ranges::move(axes.shapes, std::back_inserter(published));
             continue;
         }
-        PublishedShape shape{file.filename().string(), read_tsquare(file, unit), {}};
-        if (const auto row = table.find(shape.name); row != table.end()) {
-            shape.figures = row->second;
-        } else if (set.has_table) {
-            ++set.without_figures;
+        const std::string name = source.file.filename().string();
+        const auto row = table.find(name);
+        // A table speaks for the sets it names; with --scale-to any unit does.
+        const double size = row != table.end() && unit > 0 ? unit : options.unit > 0 ? options.unit : options.scale_to > 0 ? 1.0 : 0.0;
+        if (size == 0 && source.from_folder) {
+            set.without_unit.push_back(name);
+            continue;
         }
+        if (size == 0) throw UsageError(source.file.string(), "does not say the unit of its lengths", "give it, as in --unit 1mm, or a size, as in --scale-to 5mm");
+        PublishedShape shape{name, read_tsquare(source.file, size), {}};
+        if (row != table.end() && unit > 0) shape.figures = row->second;
         published.push_back(std::move(shape));
     }
     set.shapes.resize(published.size());
@@ -149,6 +149,8 @@ ImportedSet import_shapes(const std::vector<fs::path>& files, const ImportOption
             set.shapes[n] = imported(std::move(published[n]), options);
         }
     });
+    if (set.shapes.empty() && !set.without_unit.empty())
+        throw UsageError(set.without_unit.front(), "does not say the unit of its lengths", "give it, as in --unit 1mm, or a size, as in --scale-to 5mm");
     if (set.shapes.empty()) throw Error(sorted.tables.empty() ? "--import" : sorted.tables[0].string(), "there is no shape among the files, only a table of figures", "add the coefficient files it names");
     for (std::size_t n = 0; n < set.shapes.size(); ++n) set.shapes[n].record.id = int(n) + 1;
     return set;
