@@ -42,14 +42,29 @@ void OutputFile::commit()
     committed_ = true;
 }
 
-void write_text_file(const fs::path& target, std::string_view text)
+TextFile::TextFile(const fs::path& target) : target_(target)
 {
-    OutputFile output(target);
-    std::ofstream stream(output.temporary(), std::ios::binary);
+    if (!target.empty()) file_.emplace(target);
+}
+
+void TextFile::write(std::string_view text) const
+{
+    std::ofstream stream(file_->temporary(), std::ios::binary);
     stream.write(text.data(), static_cast<std::streamsize>(text.size()));
     stream.close();
-    if (!stream) throw Error(target.string(), "could not be written", "check the space left on the disk");
-    output.commit();
+    if (!stream) throw Error(target_.string(), "could not be written", "check the space left on the disk");
+}
+
+void TextFile::commit()
+{
+    if (file_) file_->commit();
+}
+
+void write_text_file(const fs::path& target, std::string_view text)
+{
+    TextFile file(target);
+    file.write(text);
+    file.commit();
 }
 
 std::string read_text_file(const fs::path& file)

@@ -2,6 +2,7 @@
 /// \file core/output_file.h
 /// Outputs appear whole or not at all: they are written under a temporary name beside the target, then renamed.
 #include <filesystem>
+#include <optional>
 #include <string_view>
 
 namespace coral {
@@ -17,12 +18,29 @@ public:
 
     /// Path to write to until commit().
     const std::filesystem::path& temporary() const { return temporary_; }
+    /// Path it will have.
+    const std::filesystem::path& target() const { return target_; }
     /// Flushes to disk and renames. \throws Error when the rename fails
     void commit();
 
 private:
     std::filesystem::path target_, temporary_;
     bool committed_ = false;
+};
+
+/// Text that appears together with other files of a tool: written first, in place at commit(). An empty target stands for none.
+class TextFile {
+public:
+    /// \throws Error as OutputFile
+    explicit TextFile(const std::filesystem::path& target);
+    bool wanted() const { return file_.has_value(); }
+    /// \throws Error on a full disk
+    void write(std::string_view text) const;
+    void commit();
+
+private:
+    std::filesystem::path target_;
+    std::optional<OutputFile> file_;
 };
 
 /// Writes a whole text file that way. \throws Error on a full disk or a missing folder
