@@ -1,6 +1,9 @@
 #pragma once
 /// \file morph/apparent_shape.h
 /// Apparent (void-filled) shape of a grain by a ball rolled round it, and the classes of the voids it closes over.
+#include <vector>
+
+#include "morph/voids.h"
 #include "morph/voxel_stack.h"
 
 namespace coral::morph {
@@ -25,7 +28,8 @@ struct ApparentShape {
 /// over voids that widen behind the constriction (d > b + c). Round throats are met within c: the widest ball sits on a voxel
 /// centre, which costs about what the half voxel from solid centre to solid face gives. Voids behind throats wider than 2R are outside and not seen.
 /// \param radius  of the ball [m]
-ApparentShape close_with_ball(const Mask& solid, double radius);
+/// \param voids   when given: the voids one by one, largest first; as many as void_count. Costs one more distance transform.
+ApparentShape close_with_ball(const Mask& solid, double radius, std::vector<Void>* voids = nullptr);
 
 /// Equivalent diameter [m] of the solid with its closed voids filled: the size that sets the default ball.
 double filled_diameter(const Mask& solid);

@@ -16,43 +16,58 @@ namespace {
 
 double sphere_diameter(double volume) { return std::cbrt(6.0 / std::numbers::pi * volume); }
 
+double least_diameter(const ExtractionOptions& options, const Eigen::Vector3d& voxel_size)
+{
+    return options.minimum_diameter > 0 ? options.minimum_diameter : 8.0 * voxel_size.maxCoeff();
+}
+
 /// One grain measured, or the reason why it is dropped.
 struct Outcome {
     std::optional<Grain> grain;
     DropReason reason = DropReason::small;
 };
 
-Outcome measure_label(std::span<const std::uint32_t> labels, const Eigen::Vector3i& size, const Eigen::Vector3d& voxel_size,
+Outcome measure_label(const VoxelValues& labels, const Eigen::Vector3i& size, const Eigen::Vector3d& voxel_size,
                       const LabelBox& box, const ExtractionOptions& options)
 {
-    const double least = options.minimum_diameter > 0 ? options.minimum_diameter : 8.0 * voxel_size.maxCoeff();
+    const double least = least_diameter(options, voxel_size);
     // No shape in a box is larger than the box: the cheap test spares most specks the work.
     const double box_volume = (box.high - box.low).cast<double>().cwiseProduct(voxel_size).prod();
     if (box.touches_border && !options.keep_border) return {{}, DropReason::border};
     if (box.voxels < options.minimum_voxels || sphere_diameter(box_volume) < least) return {{}, DropReason::small};
 
+    Outcome outcome;
+    outcome.grain = measure_grain(cut_out(labels, size, voxel_size, box), options, outcome.reason);
+    if (outcome.grain) outcome.grain->box = box;
+    return outcome;
+}
+
+}  // namespace
+
+std::optional<Grain> measure_grain(Mask solid, const ExtractionOptions& options, DropReason& reason)
+{
     Grain grain;
-    grain.box = box;
-    Mask solid = cut_out(labels, size, voxel_size, box);
     grain.islands = keep_largest_component(solid);
-    ApparentShape closed = close_with_ball(solid, options.closing_radius > 0 ? options.closing_radius : default_closing_radius(solid));
+    const double radius = options.closing_radius > 0 ? options.closing_radius : default_closing_radius(solid);
+    ApparentShape closed = close_with_ball(solid, radius, options.list_voids ? &grain.voids : nullptr);
     const double diameter = sphere_diameter(double(closed.filled) * solid.voxel_volume());
-    if (closed.solid < options.minimum_voxels || diameter < least) return {{}, DropReason::small};
+    reason = DropReason::small;
+    if (closed.solid < options.minimum_voxels || diameter < least_diameter(options, solid.voxel_size)) return {};
     try {
         grain.shape = measure(solid, closed);
-    } catch (const Error&) {
-        return {{}, DropReason::thin};  // no surface left, or all of it in one plane
+    } catch (const Error&) {  // no surface left, or all of it in one plane
+        reason = DropReason::thin;
+        return {};
     }
     if (options.scale_to > 0) grain.scale = options.scale_to / diameter;
     grain.shape = scaled(grain.shape, grain.scale);
+    for (Void& v : grain.voids) v = scaled(v, grain.scale);
     solid.voxel_size *= grain.scale;
     closed.apparent.voxel_size *= grain.scale;
     grain.solid = PackedMask(solid);
     grain.apparent = PackedMask(closed.apparent);
-    return {std::move(grain), {}};
+    return grain;
 }
-
-}  // namespace
 
 Descriptors scaled(Descriptors d, double factor)
 {
@@ -67,7 +82,7 @@ Descriptors scaled(Descriptors d, double factor)
     return d;
 }
 
-Extraction extract_grains(std::span<const std::uint32_t> labels, const Eigen::Vector3i& size, const Eigen::Vector3d& voxel_size,
+Extraction extract_grains(const VoxelValues& labels, const Eigen::Vector3i& size, const Eigen::Vector3d& voxel_size,
                           const ExtractionOptions& options, const std::function<void(double)>& done)
 {
     const std::vector<LabelBox> boxes = label_boxes(labels, size);

@@ -3,6 +3,7 @@
 /// From a labelled stack to measured single grains: border and size rules, islands, apparent shapes, descriptors.
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -19,6 +20,7 @@ struct ExtractionOptions {
     std::size_t minimum_voxels = 64;
     double closing_radius = 0;     ///< of the ball [m, in the CT]; 0 = 0.1 of each grain's filled diameter
     double scale_to = 0;           ///< equivalent diameter every grain is scaled to [m]; 0 = sizes as in the CT
+    bool list_voids = false;       ///< fill Grain::voids
 };
 
 struct Grain {
@@ -27,6 +29,7 @@ struct Grain {
     PackedMask solid;        ///< voxel_size scaled
     PackedMask apparent;
     Descriptors shape;       ///< lengths scaled
+    std::vector<Void> voids; ///< one by one when asked for; lengths scaled
     double scale = 1.0;      ///< factor on lengths
 };
 
@@ -44,8 +47,12 @@ struct Extraction {
 
 /// Measures all grains, several at a time. The result does not depend on the number of threads.
 /// \param done  called after each grain with the voxels finished so far (from any thread, one at a time); may be empty
-Extraction extract_grains(std::span<const std::uint32_t> labels, const Eigen::Vector3i& size, const Eigen::Vector3d& voxel_size,
+Extraction extract_grains(const VoxelValues& labels, const Eigen::Vector3i& size, const Eigen::Vector3d& voxel_size,
                           const ExtractionOptions& options, const std::function<void(double)>& done = {});
+
+/// Measures one grain: islands cut off, apparent shape, descriptors, scaling. `minimum_diameter` 0 stands for eight voxel edges.
+/// \return nothing, with `reason` set, when the grain is too small or has no surface; `box` is left for the caller
+std::optional<Grain> measure_grain(Mask solid, const ExtractionOptions& options, DropReason& reason);
 
 /// Descriptors of the grain with all lengths multiplied by `factor`.
 Descriptors scaled(Descriptors shape, double factor);
