@@ -1,0 +1,205 @@
+// grain-info on every kind of file of the chain, and on files that are not ours, damaged or newer.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "core/hdf5.h"
+#include "core/output_file.h"
+#include "morph/stack_io.h"
+#include "pack/sample.h"
+#include "sdf/vdb_io.h"
+#include "sh/shape_file.h"
+#include "sh/tabulate.h"
+#include "suffusion/checkpoint.h"
+#include "suffusion/results.h"
+#include "tools/run_program.h"
+
+namespace coral::test {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+
+const History made = {{"csct2ls", "0.1.0", {{"spacing", "200 um"}}, {"stack.tif"}}};
+
+class GrainInfo : public testing::Test {
+protected:
+    fs::path at(const std::string& name) const { return folder.path() / name; }
+    Json describe(const std::string& name) const
+    {
+        const ProgramResult result = run_program("grain-info '" + name + "' --json", folder.path());
+        EXPECT_EQ(result.exit_code, 0) << result.err;
+        return result.exit_code == 0 ? Json::parse(result.out)["files"][0] : Json();
+    }
+    std::string human(const std::string& name) const { return run_program("grain-info '" + name + "'", folder.path()).out; }
+    void expect_refusal(const std::string& name, const std::string& part) const
+    {
+        const ProgramResult result = run_program("grain-info '" + name + "'", folder.path());
+        EXPECT_EQ(result.exit_code, 1) << name << result.out;
+        EXPECT_NE(result.err.find(part), std::string::npos) << result.err;
+        EXPECT_EQ(std::ranges::count(result.err, '\n'), 1) << result.err;
+    }
+    void write_grains(const std::string& name) const
+    {
+        sdf::GrainLevelSet grain;
+        grain.id = grain.label = 3;
+        grain.solid = sh::tabulate(sh::sphere_surface(5e-3), 5e-4, 4.5e-3, 3e-3);
+        for (float& d : grain.solid.distance) d = std::min(d, 4.5e-3f);
+        grain.solid.outside_limit = 4.5e-3;
+        grain.apparent = grain.solid;
+        grain.volume = 4e-7, grain.apparent_volume = 5e-7, grain.equivalent_diameter = 1e-2, grain.intraparticle_porosity = 0.2;
+        sdf::write_grains(at(name), std::vector{grain}, made);
+    }
+    void write_shapes(const std::string& name, const std::string& version) const
+    {
+        sh::ShapeRecord shape;
+        shape.id = 7;
+        shape.surface = sh::sphere_surface(1e-3);
+        shape.volume = 4.2e-9, shape.equivalent_diameter = 2e-3;
+        sh::write_shapes(at(name), std::vector{shape}, {{"ls2sh", version, {{"degree", "10"}}, {"grains.vdb"}}});
+    }
+    ScratchFolder folder;
+};
+
+TEST_F(GrainInfo, tells_of_level_sets_and_of_shapes)
+{
+    write_grains("grains.vdb");
+    const Json grains = describe("grains.vdb");
+    EXPECT_EQ(grains["grains"], 1);
+    EXPECT_NEAR(grains["spacing"][0].get<double>(), 5e-4, 1e-12);
+    EXPECT_NEAR(grains["band"][1].get<double>(), 9, 1e-3);
+    EXPECT_NEAR(grains["intraparticle_porosity"].get<double>(), 0.2, 1e-12);
+    EXPECT_EQ(grains["each"][0]["id"], 3);
+    EXPECT_EQ(grains["history"][0]["tool"], "csct2ls");
+    EXPECT_NE(human("grains.vdb").find("500 um"), std::string::npos) << human("grains.vdb");
+
+    write_shapes("grains.sh.h5", "0.1.0");
+    const Json shapes = describe("grains.sh.h5");
+    EXPECT_EQ(shapes["shapes"], 1);
+    EXPECT_EQ(shapes["each"][0]["id"], 7);
+    EXPECT_EQ(shapes["each"][0]["degree"], 0);
+    EXPECT_EQ(shapes["method"], "sphere");
+}
+
+TEST_F(GrainInfo, tells_of_samples_results_and_checkpoints)
+{
+    pack::Sample sample;
+    sample.size = {0.01, 0.01, 0.02};
+    sample.shapes = {pack::unit_sphere()};
+    sample.materials.push_back({"default", 2780, 2e5, 1e5, 0.7, 0.3});
+    pack::Particle grain;
+    grain.scale = 4e-3;
+    sample.particles.push_back(grain);
+    grain.scale = 1e-3;
+    grain.role = pack::Role::fine;
+    sample.particles.push_back(grain);
+    sample.statistics.porosity = 0.41;
+    sample.history = made;
+    pack::write_sample(sample, at("sample.h5"));
+    const Json packed = describe("sample.h5");
+    EXPECT_EQ(packed["bodies"], 2);
+    EXPECT_NEAR(packed["porosity"].get<double>(), 0.41, 1e-12);
+    EXPECT_NEAR(packed["coarse_diameter"][1].get<double>(), 4e-3, 1e-12);
+
+    suffusion::Results results;
+    results.series = {{"time", "s", 1, {0, 0.5}}, {"eroded_mass_fraction", "1", 1, {0, 0.125}}};
+    results.history = to_json(made);
+    suffusion::write_results(at("results.h5"), results);
+    const Json run = describe("results.h5");
+    EXPECT_EQ(run["rows"], 2);
+    EXPECT_EQ(run["series"]["eroded_mass_fraction"]["last"][0], 0.125);
+
+    suffusion::Checkpoint checkpoint;
+    checkpoint.time = 0.25;
+    checkpoint.cells = 1000;
+    checkpoint.simulation = {1, 2, 3};
+    checkpoint.observer = {4};
+    suffusion::write_checkpoint(at("checkpoint.h5"), checkpoint);
+    EXPECT_EQ(describe("checkpoint.h5")["time"], 0.25);
+    EXPECT_EQ(describe("checkpoint.h5")["state_bytes"], 4);
+}
+
+TEST_F(GrainInfo, tells_of_cases_tables_and_stacks)
+{
+    fs::create_directory(at("case"));
+    write_text(at("case") / "case.toml", "[domain]\nsize = [\"10mm\", \"10mm\", \"10mm\"]\ncell = \"1mm\"\n[[body]]\nshape = { type = \"sphere\", diameter = \"2mm\" }\nposition = [\"5mm\", \"5mm\", \"5mm\"]\n[time]\nduration = \"1s\"\n");
+    for (const char* name : {"case", "case/case.toml"}) {
+        const Json scene = describe(name);
+        EXPECT_EQ(scene["bodies"], 1);
+        EXPECT_EQ(scene["fluid"], false);
+        EXPECT_EQ(scene["duration"], 1.0);
+    }
+    write_text(at("t.csv"), "id,degree,method,rms_error\n1,2,radial,0.2\n1,3,radial,0.1\n");
+    const Json table = describe("t.csv");
+    EXPECT_EQ(table["rows"], 2);
+    EXPECT_EQ(table["columns"]["rms_error"][0], 0.1);
+
+    morph::VoxelStack stack;
+    stack.size = {4, 3, 2};
+    stack.voxel_size = {3e-5, 3e-5, 6e-5};
+    std::vector<std::uint32_t> values(24, 0);
+    values[5] = 700;
+    stack.values = values;
+    morph::write_tiff(stack, at("s.tif"), 16);
+    const Json voxels = describe("s.tif");
+    EXPECT_EQ(voxels["size"], Json({4, 3, 2}));
+    EXPECT_NEAR(voxels["voxel_size"][2].get<double>(), 6e-5, 1e-9);
+    EXPECT_EQ(voxels["largest_value"], 700);
+    EXPECT_EQ(voxels["distinct_values"], 2);
+}
+
+TEST_F(GrainInfo, describes_several_files_at_once)
+{
+    write_shapes("a.sh.h5", "0.1.0");
+    write_shapes("b.sh.h5", "0.1.0");
+    const ProgramResult result = run_program("grain-info a.sh.h5 b.sh.h5 --json", folder.path());
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_EQ(Json::parse(result.out)["files"].size(), 2u);
+}
+
+TEST_F(GrainInfo, refuses_what_is_not_ours_in_one_line)
+{
+    write_text(at("notes.txt"), "shopping list\n");
+    write_text(at("empty.vdb"), "");
+    write_text(at("other.csv"), "a,b\n1,2\n");
+    write_text(at("text.h5"), "this is no HDF5 file at all");
+    write_text(at("bad.toml"), "[domain]\nsize = 3\nsell = 4\n");
+    H5File other = H5File::create(at("other.h5"));
+    other.make_group("/something");
+    other.commit();
+    expect_refusal("notes.txt", "no file of ours");
+    expect_refusal("empty.vdb", "is empty");
+    expect_refusal("other.csv", "none of ours");
+    expect_refusal("text.h5", "not an HDF5 file");
+    expect_refusal("other.h5", "none of ours");
+    expect_refusal("bad.toml", "bad.toml");
+    expect_refusal("absent.vdb", "absent.vdb");
+    fs::create_directory(at("folder"));
+    expect_refusal("folder", "folder");
+}
+
+TEST_F(GrainInfo, refuses_damaged_files_and_those_of_a_newer_version)
+{
+    write_grains("grains.vdb");
+    const std::string whole = read_text_file(at("grains.vdb"));
+    for (const double share : {0.02, 0.3, 0.9}) {
+        write_text(at("cut.vdb"), whole.substr(0, std::size_t(share * double(whole.size()))));
+        expect_refusal("cut.vdb", "cut.vdb");
+    }
+    write_shapes("shapes.sh.h5", "0.1.0");
+    const std::string shapes = read_text_file(at("shapes.sh.h5"));
+    write_text(at("cut.sh.h5"), shapes.substr(0, shapes.size() / 2));
+    expect_refusal("cut.sh.h5", "damaged");
+
+    write_shapes("newer.sh.h5", "99.0.0");
+    expect_refusal("newer.sh.h5", "was made by ls2sh 99.0.0, newer than this");
+    H5File checkpoint = H5File::create(at("newer.h5"));
+    checkpoint.set_attribute("/", "format_version", std::int64_t(9));
+    checkpoint.make_group("/simulation");
+    checkpoint.commit();
+    expect_refusal("newer.h5", "newer version");
+}
+
+}  // namespace
+}  // namespace coral::test
