@@ -6,6 +6,7 @@
 #include "core/error.h"
 #include "core/parallel.h"
 #include "core/text.h"
+#include "sdf/detail/assembly.h"
 #include "sdf/detail/closest_point.h"
 #include "sdf/detail/occupancy.h"
 #include "sdf/mass_properties.h"
@@ -71,7 +72,21 @@ double shift_for_volume(const DistanceGrid& grid, double volume, double limit)
     return 0.5 * (low + high);
 }
 
-/// Pieces of negative nodes, joined over faces, edges and corners.
+void check(const LevelSetOptions& options, const GrainMask& mask)
+{
+    if (!(options.smoothing >= 0.3 && options.smoothing <= 1.0))
+        throw Error("level set", "smoothing of " + to_text(options.smoothing) + " voxels", "take 0.3 to 1; wider smoothing closes thin walls");
+    if (!(options.inside_band >= 2.0 && options.outside_band >= 2.0))
+        throw Error("level set", "a band narrower than 2 nodes", "take at least 2,2");
+    if (!(options.spacing > 0)) throw Error("level set", "spacing must be positive");
+    if (options.spacing < 0.5 * mask.voxel_size.minCoeff())
+        throw Error("level set", "spacing is less than half a voxel", "a spacing of the voxel size or more invents no detail");
+}
+
+}  // namespace
+
+namespace detail {
+
 int count_components(const DistanceGrid& grid)
 {
     std::vector<std::uint8_t> open(grid.node_count());
@@ -109,18 +124,21 @@ void clamp_to_band(DistanceGrid& grid, double shift, const LevelSetOptions& opti
     grid.inside_limit = inside;
 }
 
-void check(const LevelSetOptions& options, const GrainMask& mask)
+void complete(GrainLevelSet& grain)
 {
-    if (!(options.smoothing >= 0.3 && options.smoothing <= 1.0))
-        throw Error("level set", "smoothing of " + to_text(options.smoothing) + " voxels", "take 0.3 to 1; wider smoothing closes thin walls");
-    if (!(options.inside_band >= 2.0 && options.outside_band >= 2.0))
-        throw Error("level set", "a band narrower than 2 nodes", "take at least 2,2");
-    if (!(options.spacing > 0)) throw Error("level set", "spacing must be positive");
-    if (options.spacing < 0.5 * mask.voxel_size.minCoeff())
-        throw Error("level set", "spacing is less than half a voxel", "a spacing of the voxel size or more invents no detail");
+    const MassProperties body = mass_properties(grain.solid);
+    if (!(body.volume > 0)) throw Error("level set", "the grain has no volume left on this spacing", "take a finer spacing");
+    grain.volume = body.volume;
+    grain.inertia = body.inertia;
+    grain.centre = body.centroid;
+    grain.solid.origin -= body.centroid;
+    grain.apparent.origin -= body.centroid;
+    grain.apparent_volume = solid_volume(grain.apparent);
+    grain.equivalent_diameter = std::cbrt(6.0 * grain.apparent_volume / std::numbers::pi);
+    grain.intraparticle_porosity = (grain.apparent_volume - grain.volume) / grain.apparent_volume;
 }
 
-}  // namespace
+}  // namespace detail
 
 DistanceGrid level_set_from_mask(const GrainMask& mask, const LevelSetOptions& options, LevelSetReport* report, const DistanceGrid* lattice)
 {
@@ -140,7 +158,7 @@ DistanceGrid level_set_from_mask(const GrainMask& mask, const LevelSetOptions& o
 
     const double voxel_volume = double(occupancy.solid_voxels) * mask.voxel_size.prod();
     const double shift = options.keep_volume ? shift_for_volume(grid, voxel_volume, largest_shift) : 0.0;
-    clamp_to_band(grid, shift, options);
+    detail::clamp_to_band(grid, shift, options);
     if (report) {
         report->voxel_volume = voxel_volume;
         report->volume = solid_volume(grid);
@@ -148,7 +166,7 @@ DistanceGrid level_set_from_mask(const GrainMask& mask, const LevelSetOptions& o
         report->shift_limited = std::abs(shift) >= largest_shift;
         report->foot_points = feet.size();
         report->voxels_smoothed_out = occupancy.smoothed_out;
-        report->solid_components = count_components(grid);
+        report->solid_components = detail::count_components(grid);
     }
     return grid;
 }
@@ -159,16 +177,7 @@ GrainLevelSet grain_from_masks(const GrainMask& solid, const GrainMask& apparent
     GrainLevelSet grain;
     grain.solid = level_set_from_mask(solid, options, solid_report);
     grain.apparent = level_set_from_mask(apparent, options, apparent_report, &grain.solid);
-    const MassProperties body = mass_properties(grain.solid);
-    if (!(body.volume > 0)) throw Error("level set", "the grain has no volume left on this spacing", "take a finer spacing");
-    grain.volume = body.volume;
-    grain.inertia = body.inertia;
-    grain.centre = body.centroid;
-    grain.solid.origin -= body.centroid;
-    grain.apparent.origin -= body.centroid;
-    grain.apparent_volume = solid_volume(grain.apparent);
-    grain.equivalent_diameter = std::cbrt(6.0 * grain.apparent_volume / std::numbers::pi);
-    grain.intraparticle_porosity = (grain.apparent_volume - grain.volume) / grain.apparent_volume;
+    detail::complete(grain);
     return grain;
 }
 
