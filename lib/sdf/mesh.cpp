@@ -130,7 +130,7 @@ void put(std::ofstream& out, T value)
 
 void finish(OutputFile& output, std::ofstream& stream, const std::filesystem::path& file)
 {
-    if (!stream.flush()) throw Error(file.string(), "cannot be written", "is the disk full?");
+    if (!stream.flush()) throw Error(file.string(), "could not be written", "check the space left on the disk");
     stream.close();
     output.commit();
 }

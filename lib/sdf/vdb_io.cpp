@@ -20,6 +20,8 @@ namespace {
 
 constexpr double millimetres = 1e3;  // of one metre; the only place where lengths are not in metres
 
+constexpr std::int32_t format_version = 1;  // of names, metadata and units; files without one are version 1
+
 using openvdb::FloatGrid;
 
 std::string grid_name(int id, bool apparent) { return "grain_" + std::to_string(id) + (apparent ? "_apparent" : ""); }
@@ -87,6 +89,18 @@ void describe(FloatGrid& vdb, const GrainLevelSet& grain)
     vdb.insertMeta("inertia", openvdb::StringMetadata(inertia));
     vdb.insertMeta("centre", openvdb::Vec3DMetadata(openvdb::Vec3d(grain.centre.x(), grain.centre.y(), grain.centre.z())));
 }
+
+/// OpenVDB's File does not look at the stream after its last byte: a full disk would leave a cut file without a word.
+class CheckedArchive : public openvdb::io::Archive {
+public:
+    void write_file(const std::filesystem::path& file, const openvdb::GridCPtrVec& grids, const openvdb::MetaMap& metadata) const
+    {
+        std::ofstream stream(file, std::ios::binary);
+        stream.exceptions(std::ios::badbit | std::ios::failbit);  // with a word as to the place before more work is done
+        Archive::write(stream, grids, /*seekable=*/true, metadata);
+        stream.close();
+    }
+};
 
 /// OpenVDB writes a random UUID behind magic number (8 bytes), file version, library version (3 x 4) and a flag (1).
 /// It is replaced by one made from the content, so that the same grains give the same bytes.
@@ -157,7 +171,7 @@ auto guarded(const std::filesystem::path& file, const Read& read)
     } catch (const Error&) {
         throw;
     } catch (const std::exception& problem) {
-        throw Error(file.string(), std::string("no readable file of grains (") + problem.what() + ")", "make it with csct2ls");
+        throw Error(file.string(), std::string("no readable file of grains (") + problem.what() + ")", "make it with csct2ls, or copy it again");
     }
 }
 
@@ -182,6 +196,7 @@ void GrainWriter::add(const GrainLevelSet& grain)
 
 void GrainWriter::commit(const History& history)
 {
+    const std::string target = impl_->output.target().string();
     const openvdb::StringMetadata text(to_json(history));
     openvdb::GridCPtrVec all;
     for (const auto& [id, pair] : impl_->grids)
@@ -192,13 +207,14 @@ void GrainWriter::commit(const History& history)
     openvdb::MetaMap metadata;
     metadata.insertMeta("history", text);
     metadata.insertMeta("content", openvdb::StringMetadata("coralsand grains"));
+    metadata.insertMeta("format_version", openvdb::Int32Metadata(format_version));
     const std::filesystem::path& file = impl_->output.temporary();
     try {
-        openvdb::io::File vdb(file.string());
-        vdb.write(all, metadata);
-        vdb.close();
+        CheckedArchive().write_file(file, all, metadata);
+    } catch (const std::ios_base::failure&) {
+        throw Error(target, "could not be written", "check the space left on the disk");
     } catch (const std::exception& problem) {
-        throw Error(file.string(), std::string("cannot be written: ") + problem.what());
+        throw Error(target, std::string("could not be written (") + problem.what() + ")", "check the space left on the disk");
     }
     make_reproducible(file);
     impl_->output.commit();
@@ -222,6 +238,10 @@ GrainReader::GrainReader(const std::filesystem::path& file) : impl_(new Impl{fil
         const auto metadata = vdb.getMetadata();
         const auto content = metadata->getMetadata<openvdb::StringMetadata>("content");
         if (!content || content->value() != "coralsand grains") throw Error(file.string(), "holds no grains of ours", "make it with csct2ls");
+        const auto version = metadata->getMetadata<openvdb::Int32Metadata>("format_version");
+        if (version && version->value() > format_version)
+            throw Error(file.string(), "is of format " + std::to_string(version->value()) + ", this program reads up to " + std::to_string(format_version),
+                        "use the newer version that wrote it: grid metadata `history` names it");
         impl_->history = history_from_json(metadata->metaValue<std::string>("history"), file.string());
     });
     std::sort(impl_->ids.begin(), impl_->ids.end());
