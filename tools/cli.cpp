@@ -136,7 +136,7 @@ std::string parse_problem(const CLI::App& app, const CLI::ParseError& error, con
 /// Every option with the value in use, for the history. Those that cannot change results, or name files, are left out.
 std::map<std::string, std::string> options_in_use(const CLI::App& app)
 {
-    static const std::vector<std::string> silent{"help", "version", "threads", "quiet", "json", "config", "table", "mesh", "convergence", "resume", "until"};
+    static const std::vector<std::string> silent{"help", "version", "threads", "quiet", "json", "config", "table", "voids", "mesh", "mesh-format", "convergence", "resume", "until"};
     std::map<std::string, std::string> options;
     for (const CLI::Option* option : app.get_options()) {
         if (option->get_lnames().empty()) continue;

@@ -102,7 +102,7 @@ TEST(Csct2ls, takes_dark_solid_and_splits_touching_grains)
     morph::VoxelStack stack = two_spheres(0, 0, 255);
     for (int i = 30; i < 40; ++i)  // a neck between the two
         for (int j = 16; j < 20; ++j)
-            for (int k = 15; k < 19; ++k) stack.values[stack.index(i, j, k)] = 0;
+            for (int k = 15; k < 19; ++k) stack.values.set(stack.index(i, j, k), 0);
     morph::write_tiff(stack, folder.path() / "stack.tif", 8);
     const std::string command = "csct2ls stack.tif -o grains.vdb --voxel-size 30um --solid dark --json";
     const auto whole = nlohmann::json::parse(run_program(command, folder.path()).out);
@@ -142,14 +142,14 @@ TEST(Csct2ls, damaged_inputs_end_with_1)
     fs::resize_file(cut, fs::file_size(cut) / 2);
     expect_failure(folder, "cut.tif --voxel-size 30um", 1, "cut.tif: page");
     morph::VoxelStack zero = two_spheres();
-    std::fill(zero.values.begin(), zero.values.end(), 0U);
+    zero.values = morph::VoxelValues(zero.count(), 0);
     morph::write_tiff(zero, folder.path() / "zero.tif", 8);
     expect_failure(folder, "zero.tif --voxel-size 30um", 1, "every voxel is 0");
     fs::create_directory(folder.path() / "slices");
     for (int k : {1, 2, 4}) {
         morph::VoxelStack slice;
         slice.size = {8, 8, 1};
-        slice.values.assign(64, 1);
+        slice.values = morph::VoxelValues(64, 1);
         morph::write_tiff(slice, folder.path() / "slices" / ("s" + std::to_string(k) + ".tif"), 8);
     }
     expect_failure(folder, "slices --voxel-size 30um", 1, "slice 3 is missing");
