@@ -17,9 +17,8 @@ NearestFoot::NearestFoot(const Lattice& lattice, const std::vector<FootPoint>& f
         for (int j = 0; j < lattice.size.y(); ++j)
             for (int i = 0; i < lattice.size.x(); ++i, ++node) squared_[padded(i, j, k)] = solid[node] ? solid2 : open2;
     scatter();
-    for (int round = 0; round < 2; ++round)
-        for (int direction = 0; direction < 8; ++direction)
-            sweep(direction & 1 ? -1 : 1, direction & 2 ? -1 : 1, direction & 4 ? -1 : 1);
+    // The straight line from a foot to a node stays in one octant, so one sweep for each octant carries it there.
+    for (int direction = 0; direction < 8; ++direction) sweep(direction & 1 ? -1 : 1, direction & 2 ? -1 : 1, direction & 4 ? -1 : 1);
 }
 
 /// Offers every foot point to the 4^3 nodes around it. The first of equals stays, so the order of feet decides.

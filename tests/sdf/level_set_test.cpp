@@ -156,6 +156,44 @@ TEST(LevelSet, does_not_depend_on_threads_or_on_empty_voxels_around)
     for (std::size_t n = 0; n < grid.distance.size(); ++n) ASSERT_NEAR(padded.distance[n], grid.distance[n], 1e-4 * c);
 }
 
+/// Share of placements in which a slab 12 h thick keeps a channel open: a hole, or a slit, of the given width along a slanted axis.
+double share_open(double width, bool slit, double h)
+{
+    constexpr int placements = 8;
+    int open = 0;
+    for (int n = 0; n < placements; ++n) {
+        const Eigen::Matrix3d frame = Eigen::AngleAxisd(0.1 + 0.06 * n, Eigen::Vector3d(1, 0.3 * n, 0).normalized()).toRotationMatrix();
+        const Eigen::Vector3d middle = Eigen::Vector3d(7, 7, 7) * h + Eigen::Vector3d(0.37, 0.71, 0.53) * (0.9 * n) * c;
+        const auto across = [&](const Eigen::Vector3d& p) { return slit ? std::abs(p.x()) : std::hypot(p.x(), p.y()); };
+        const Distance truth = [&](const Eigen::Vector3d& x) {
+            const double hole = 0.5 * width - across(frame.transpose() * (x - middle));
+            return std::max({(x - middle).cwiseAbs().maxCoeff() - 6 * h, hole});
+        };
+        const Mask mask = voxelise(truth, cube(int(15 * h / c)), Eigen::Vector3d::Constant(c));
+        const DistanceGrid grid = level_set_from_mask(mask.view, {.spacing = h, .keep_volume = true});
+        bool through = true;  // in every cut across the axis some point of the channel must be open
+        for (double z = -4 * h; through && z <= 4 * h; z += 0.25 * h) {
+            double widest = -1;
+            for (int a = -4; a <= 4; ++a)
+                for (int b = -4; b <= 4; ++b)
+                    widest = std::max(widest, grid.sample(middle + frame * Eigen::Vector3d(0.125 * a * width, (slit ? 0.5 * h : 0.125 * width) * b, z)));
+            through = widest > 0;
+        }
+        open += through;
+    }
+    return double(open) / placements;
+}
+
+TEST(LevelSet, keeps_round_throats_of_one_and_a_half_spacings_and_slits_of_one)
+{
+    const double h = 4 * c;
+    EXPECT_EQ(share_open(1.5 * h, false, h), 1.0);
+    EXPECT_EQ(share_open(2.0 * h, false, h), 1.0);
+    EXPECT_EQ(share_open(1.0 * h, true, h), 1.0);
+    // What the documents say is lost must not come and go: a hole of half a spacing closes.
+    EXPECT_LE(share_open(0.5 * h, false, h), 0.1);
+}
+
 TEST(LevelSet, refuses_what_has_no_answer)
 {
     const Mask empty = voxelise([](const Eigen::Vector3d&) { return 1.0; }, cube(8), Eigen::Vector3d::Constant(c));

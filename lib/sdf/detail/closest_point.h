@@ -54,11 +54,13 @@ template <class Project>
 double refined_distance(const Eigen::Vector3d& x, const FootPoint& foot, double longest, const Project& project)
 {
     Eigen::Vector3d p = foot.position.cast<double>(), normal = foot.normal.cast<double>();
+    // What a step along the surface can still take off the distance is length^2/2d on a flat one.
+    constexpr double negligible = 1e-3;  // of twice the longest step
     double best = (x - p).squaredNorm(), stride = 1.0;  // stride: step per tangential residual, 1 on a flat surface
     for (int n = 0; n < 4; ++n) {
         const Eigen::Vector3d r = x - p, residual = r - r.dot(normal) * normal;
         const double length = residual.norm();
-        if (length < 2e-3 * longest) break;
+        if (length * length <= negligible * longest * std::sqrt(best)) break;
         const double step = std::min(stride * length, longest);
         const Eigen::Vector3d direction = residual / length;
         Eigen::Vector3d q = p + step * direction, q_normal;
