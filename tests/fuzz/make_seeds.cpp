@@ -52,7 +52,7 @@ void write_pages(const fs::path& file, const char* mode, int bits, int compressi
     TIFFClose(tiff);
 }
 
-void tiff(const fs::path& folder)
+void write_tiffs(const fs::path& folder)
 {
     write_pages(folder / "strips.tif", "w", 8, COMPRESSION_NONE, false);
     write_pages(folder / "lzw.tif", "w", 16, COMPRESSION_LZW, false);
@@ -90,7 +90,7 @@ void hdf5(const fs::path& folder)
     sh::ShapeRecord shape;
     shape.id = 1;
     shape.surface.degree = 1;
-    shape.surface.coefficients.setZero(4);
+    shape.surface.coefficients.assign(4, 0.0);
     shape.surface.coefficients[0] = 1;
     shape.volume = shape.solid_volume = shape.equivalent_diameter = 1;
     sh::write_shapes(folder / "shapes.h5", {&shape, 1}, {{"ls2sh", "1", {}, {}}});
@@ -123,7 +123,7 @@ int main(int argc, char** argv)
     if (argc != 2) return 2;
     const fs::path root = argv[1];
     for (const char* name : {"tiff", "nrrd", "metaimage", "hdf5", "vdb", "toml"}) fs::create_directories(root / name);
-    tiff(root / "tiff");
+    write_tiffs(root / "tiff");
     headers(root / "nrrd", root / "metaimage");
     hdf5(root / "hdf5");
     vdb(root / "vdb");
