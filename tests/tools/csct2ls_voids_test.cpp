@@ -70,7 +70,7 @@ TEST(Csct2lsVoids, lists_every_void_with_its_throat_and_depth)
     EXPECT_GT(cell(voids, 1, "z"), 0) << "the mouth is on the upper side";
     for (const std::size_t row : {0, 1}) {
         EXPECT_NEAR(cell(grains, row, "void_volume_retained"), 1, 0.01);
-        EXPECT_GT(cell(grains, row, "void_overlap"), 0.93);
+        EXPECT_GT(cell(grains, row, "void_overlap"), 0.88) << "of a cavity 10 voxels wide about a voxel centre, 30 of 515 voxels lie right on its surface";
         EXPECT_EQ(cell(grains, row, "void_count"), 1);
     }
     EXPECT_TRUE(grains.columns.at(grains.columns.size() - 2) == "void_volume_retained" && grains.columns.back() == "void_overlap");
