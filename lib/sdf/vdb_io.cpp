@@ -102,6 +102,32 @@ public:
     }
 };
 
+/// Last bytes of a file: OpenVDB takes lengths out of a cut file for memory, without end, so the cut must be seen before it looks.
+constexpr std::string_view end_mark = "coralend";
+
+void append_end_mark(const std::filesystem::path& file)
+{
+    const std::uint64_t length = std::filesystem::file_size(file);
+    std::ofstream stream(file, std::ios::binary | std::ios::app);
+    stream.write(end_mark.data(), std::streamsize(end_mark.size()));
+    for (int byte = 0; byte < 8; ++byte) stream.put(char(length >> (8 * byte) & 0xff));
+    stream.close();
+    if (!stream) throw Error(file.string(), "could not be written", "check the space left on the disk");
+}
+
+bool ends_as_written(const std::filesystem::path& file)
+{
+    const std::uint64_t size = std::filesystem::file_size(file);
+    if (size < 16) return false;
+    std::array<char, 16> tail{};
+    std::ifstream stream(file, std::ios::binary);
+    stream.seekg(std::streamoff(size - 16));
+    if (!stream.read(tail.data(), 16) || std::string_view(tail.data(), 8) != end_mark) return false;
+    std::uint64_t length = 0;
+    for (int byte = 0; byte < 8; ++byte) length |= std::uint64_t(std::uint8_t(tail[std::size_t(8 + byte)])) << (8 * byte);
+    return length == size - 16;
+}
+
 /// OpenVDB writes a random UUID behind magic number (8 bytes), file version, library version (3 x 4) and a flag (1).
 /// It is replaced by one made from the content, so that the same grains give the same bytes.
 void make_reproducible(const std::filesystem::path& file)
@@ -216,6 +242,7 @@ void GrainWriter::commit(const History& history)
     } catch (const std::exception& problem) {
         throw Error(target, std::string("could not be written (") + problem.what() + ")", "check the space left on the disk");
     }
+    append_end_mark(file);
     make_reproducible(file);
     impl_->output.commit();
 }
@@ -230,6 +257,7 @@ GrainReader::GrainReader(const std::filesystem::path& file) : impl_(new Impl{fil
 {
     openvdb::initialize();
     if (!std::filesystem::is_regular_file(file)) throw Error(file.string(), "no such file");
+    if (!ends_as_written(file)) throw Error(file.string(), "holds no grains of ours, or is cut short", "make it with csct2ls, or copy it again");
     guarded(file, [&] {
         openvdb::io::File vdb(file.string());
         vdb.open(false);

@@ -296,8 +296,8 @@ TEST_F(BadInput, level_sets_that_are_not_ours_or_newer_are_refused_by_the_next_t
         EXPECT_EQ(std::ranges::count(result.err, '\n'), 1) << result.err;
         EXPECT_FALSE(fs::exists(folder_.path() / "g.sh.h5"));
     };
-    refused("no volume at all", "no readable file of grains");
-    refused("", "no readable file of grains");
+    refused("no volume at all", "holds no grains of ours");
+    refused("", "holds no grains of ours");
     refused(text.substr(0, text.size() / 2), "");
     std::string foreign = text;
     foreign.replace(foreign.find("coralsand grains"), 9, "somebody.");

@@ -181,6 +181,12 @@ TEST_F(GrainInfo, refuses_what_is_not_ours_in_one_line)
 
 TEST_F(GrainInfo, refuses_damaged_files_and_those_of_a_newer_version)
 {
+    write_grains("grains.vdb");
+    const std::string grains = read_text_file(at("grains.vdb"));
+    for (const double share : {0.02, 0.3, 0.9}) {
+        write_text(at("cut.vdb"), grains.substr(0, std::size_t(share * double(grains.size()))));
+        expect_refusal("cut.vdb", "cut.vdb: holds no grains of ours, or is cut short");
+    }
     write_shapes("shapes.sh.h5", "0.1.0");
     const std::string shapes = read_text_file(at("shapes.sh.h5"));
     write_text(at("cut.sh.h5"), shapes.substr(0, shapes.size() / 2));

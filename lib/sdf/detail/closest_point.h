@@ -55,7 +55,7 @@ double refined_distance(const Eigen::Vector3d& x, const FootPoint& foot, double 
 {
     Eigen::Vector3d p = foot.position.cast<double>(), normal = foot.normal.cast<double>();
     // What a step along the surface can still take off the distance is length^2/2d on a flat one.
-    constexpr double negligible = 1e-3;  // of twice the longest step
+    constexpr double negligible = 2e-4;  // of twice the longest step
     double best = (x - p).squaredNorm(), stride = 1.0;  // stride: step per tangential residual, 1 on a flat surface
     for (int n = 0; n < 4; ++n) {
         const Eigen::Vector3d r = x - p, residual = r - r.dot(normal) * normal;
