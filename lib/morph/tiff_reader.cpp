@@ -167,6 +167,9 @@ private:
         std::uint32_t tile_width = 0, tile_height = 0;
         TIFFGetField(t, TIFFTAG_TILEWIDTH, &tile_width);
         TIFFGetField(t, TIFFTAG_TILELENGTH, &tile_height);
+        const auto limit = [](std::uint32_t edge) { return 2 * std::max(edge, std::uint32_t{1024}); };
+        if (tile_width > limit(p.width) || tile_height > limit(p.height))
+            throw Error(where(number), "has tiles of " + std::to_string(tile_width) + " x " + std::to_string(tile_height) + ", more than its size", damaged_hint);
         std::vector<std::byte> tile(std::size_t(TIFFTileSize(t)));
         const std::size_t tile_row = std::size_t(TIFFTileRowSize(t));
         for (std::uint32_t y = 0; y < p.height; y += tile_height)
