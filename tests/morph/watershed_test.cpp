@@ -70,6 +70,37 @@ TEST(Watershed, finds_the_closing_radius_itself)
     EXPECT_NEAR(result.closing_radius, 2.4, 0.5);
 }
 
+TEST(Watershed, parts_27_touching_porous_ellipsoids)
+{
+    // 3 x 3 x 3 grains of unlike axes that overlap by a voxel or two, a quarter of each taken up by voids of radius 2.
+    const auto centre = [](int n) { return Eigen::Vector3d(Eigen::Vector3d::Constant(16.3) + 26.0 * Eigen::Vector3d(n % 3, n / 3 % 3, n / 9)); };
+    const auto depth = [&](const Eigen::Vector3d& p, int n) {
+        const Eigen::Vector3d axes = Eigen::Vector3d(13.6, 14.2, 13.2) + Eigen::Vector3d(n % 2, 0.5 * (n % 3), 0.7 * (n % 4));
+        return (p - centre(n)).cwiseQuotient(axes).norm();
+    };
+    const Mask solid = test::draw({86, 86, 86}, [&](const Eigen::Vector3d& p) {
+        const Eigen::Vector3d in_cell = p.unaryExpr([](double x) { return x - 7.0 * std::round(x / 7.0); });
+        if (in_cell.norm() <= 2.0) return false;
+        for (int n = 0; n < 27; ++n)
+            if (depth(p, n) <= 1.0) return true;
+        return false;
+    });
+    const WatershedResult result = split_touching_grains(solid, {});
+    EXPECT_EQ(result.grains, 27U);
+    std::set<std::uint32_t> used;
+    for (int n = 0; n < 27; ++n) {  // the core of each grain carries one label of its own
+        std::set<std::uint32_t> own;
+        for (int k = 0; k < 86; ++k)
+            for (int j = 0; j < 86; ++j)
+                for (int i = 0; i < 86; ++i)
+                    if (solid.voxels[solid.index(i, j, k)] && depth(Eigen::Vector3d(i + 0.5, j + 0.5, k + 0.5), n) < 0.75)
+                        own.insert(result.labels[solid.index(i, j, k)]);
+        EXPECT_EQ(own.size(), 1U) << n;
+        used.insert(own.begin(), own.end());
+    }
+    EXPECT_EQ(used.size(), 27U);
+}
+
 TEST(Watershed, labels_solid_only_and_all_of_it)
 {
     const Mask solid = touching_spheres(1.7);
