@@ -67,7 +67,7 @@ struct Context {
 /// Parses, runs and returns the exit code: 0 done, 1 the work failed, 2 wrong command line or config.
 /// \param declare  adds the tool's options
 /// \param run      does the work; throws Error or UsageError
-/// \param random   whether the tool takes --seed (then *seed is set)
+/// \param seed     where the value of --seed goes; null: the tool takes none
 int run_tool(int argc, char** argv, const std::string& name, const std::string& description, const std::function<void(Options&)>& declare,
              const std::function<void(const Context&)>& run, std::uint64_t* seed = nullptr);
 

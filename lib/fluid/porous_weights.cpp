@@ -94,7 +94,7 @@ std::size_t FineCoupling::stored_weights() const
 }
 
 /// Largest block that divides the grid and leaves 1.5 blocks per smallest diameter: the felt averages do not change
-/// [docs/numerics.md, section 7].
+/// by it.
 void FineCoupling::choose_blocks(std::span<const double> diameters)
 {
     block_ = std::max(options_.coupling_cells, 1);

@@ -1,7 +1,6 @@
 #pragma once
 /// \file morph/voxel_values.h
 /// Integers of a stack in few bytes: most stacks need one or two a voxel, and a stack may fill half the memory.
-#include <compare>
 #include <cstddef>
 #include <cstdint>
 #include <iterator>
