@@ -4,13 +4,19 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cmath>
 #include <cstring>
 
 #include "core/error.h"
 #include "core/output_file.h"
+#include "core/record.h"
 
 namespace coral {
 namespace {
+
+/// HDF5 fills in what was never written, so that a damaged size may ask for any amount of memory. Deflate packs 1032 : 1 at best.
+constexpr double most_unpacked_per_stored = 1100;
+constexpr double always_allowed_bytes = 64 << 20;
 
 /// An HDF5 identifier closed by the function that fits it.
 class Id {
@@ -56,7 +62,7 @@ Id creation_list(const std::vector<std::size_t>& dims)
 
 bool numeric(const std::string& text)
 {
-    return !text.empty() && std::ranges::all_of(text, [](unsigned char c) { return std::isdigit(c); });
+    return !text.empty() && text.size() < 19 && std::ranges::all_of(text, [](unsigned char c) { return std::isdigit(c); });
 }
 
 herr_t collect_name(hid_t, const char* name, const H5L_info_t*, void* names)
@@ -73,6 +79,7 @@ struct H5File::Impl {
     hid_t file = -1;
 
     ~Impl() { close(); }
+    const std::filesystem::path& file_on_disk() const { return output ? output->temporary() : path; }
     void close()
     {
         if (file >= 0) H5Fclose(file);
@@ -81,6 +88,12 @@ struct H5File::Impl {
     [[noreturn]] void fail(const std::string& object, const std::string& what) const
     {
         throw Error(path.string() + ":" + object, what, output ? "check the space left on the disk" : "is it the right file? make it again with the tool that wrote it");
+    }
+    /// What an attribute of the file itself is called in a message: "file.h5" rather than "file.h5:/".
+    [[noreturn]] void fail_attribute(const std::string& object, const std::string& name, const std::string& what) const
+    {
+        throw Error(object == "/" ? path.string() : path.string() + ":" + object, "attribute " + name + " " + what,
+                    output ? "check the space left on the disk" : "is it the right file? make it again with the tool that wrote it");
     }
     bool exists(const std::string& object) const
     {
@@ -111,12 +124,32 @@ struct H5File::Impl {
         if (id < 0) fail(object, "is not a dataset");
         return {id, H5Dclose};
     }
-    std::vector<std::size_t> dims(hid_t dataset) const
+    /// Dimensions of a dataset. \throws Error when they, or those of its chunks, ask for far more than the file stores
+    std::vector<std::size_t> dims(hid_t dataset, const std::string& object) const
     {
         const Id space(H5Dget_space(dataset), H5Sclose);
         std::vector<hsize_t> sizes(static_cast<std::size_t>(std::max(0, H5Sget_simple_extent_ndims(space))));
         H5Sget_simple_extent_dims(space, sizes.data(), nullptr);
+        const Id type(H5Dget_type(dataset), H5Tclose), list(H5Dget_create_plist(dataset), H5Pclose);
+        if (!space.valid() || !type.valid() || !list.valid()) fail(object, "is damaged");
+        const H5D_layout_t layout = H5Pget_layout(list);
+        if (layout != H5D_VIRTUAL && H5Pget_external_count(list) == 0) {
+            const double stored = std::min(double(H5Dget_storage_size(dataset)), double(std::filesystem::file_size(file_on_disk())));
+            const double most = std::max(always_allowed_bytes, stored * (layout == H5D_CHUNKED ? most_unpacked_per_stored : 1));
+            require_bytes(sizes, type, most, stored, object);
+            std::vector<hsize_t> chunk(layout == H5D_CHUNKED ? sizes.size() : 0);
+            if (!chunk.empty() && H5Pget_chunk(list, int(chunk.size()), chunk.data()) < 0) fail(object, "is damaged");
+            if (!chunk.empty()) require_bytes(chunk, type, most, stored, object);
+        }
         return {sizes.begin(), sizes.end()};
+    }
+    void require_bytes(const std::vector<hsize_t>& sizes, hid_t type, double most, double stored, const std::string& object) const
+    {
+        double bytes = double(H5Tget_size(type));
+        for (const hsize_t n : sizes) bytes *= double(n);
+        if (bytes > most || (bytes == 0 && std::ranges::any_of(sizes, [](hsize_t n) { return n > hsize_t{1} << 40; })))
+            throw Error(path.string() + ":" + object, "announces " + std::to_string(std::uint64_t(std::min(bytes, 1e19))) + " bytes but stores " +
+                                                          std::to_string(std::uint64_t(stored)), "the file is damaged; copy it again");
     }
     void write(const std::string& object, const void* data, std::size_t count, hid_t type, const std::vector<std::size_t>& shape)
     {
@@ -135,7 +168,7 @@ struct H5File::Impl {
     {
         const Id dataset = open_dataset(object);
         std::size_t count = 1;
-        for (std::size_t d : dims(dataset)) count *= d;
+        for (std::size_t d : dims(dataset, object)) count *= d;
         const Id stored(H5Dget_type(dataset), H5Tclose);
         const H5T_class_t kind = H5Tget_class(stored);
         if (kind != H5T_INTEGER && kind != H5T_FLOAT) fail(object, "holds no numbers");
@@ -149,13 +182,13 @@ struct H5File::Impl {
         if (!owner.valid()) fail(object, "is missing");
         if (H5Aexists(owner, name.c_str()) > 0) H5Adelete(owner, name.c_str());
         const Id attribute(H5Acreate2(owner, name.c_str(), type, space, H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
-        if (!attribute.valid() || H5Awrite(attribute, type, data) < 0) fail(object, "attribute " + name + " could not be written");
+        if (!attribute.valid() || H5Awrite(attribute, type, data) < 0) fail_attribute(object, name, "could not be written");
     }
     Id open_attribute(const std::string& object, const std::string& name) const
     {
         if (!exists(object)) fail(object, "is missing");
         const hid_t id = H5Aopen_by_name(file, object.c_str(), name.c_str(), H5P_DEFAULT, H5P_DEFAULT);
-        if (id < 0) fail(object, "attribute " + name + " is missing");
+        if (id < 0) fail_attribute(object, name, "is missing");
         return {id, H5Aclose};
     }
 };
@@ -176,19 +209,19 @@ H5File H5File::create(const std::filesystem::path& file)
     const Id creation(H5Pcreate(H5P_FILE_CREATE), H5Pclose);
     H5Pset_obj_track_times(creation, 0);
     impl->file = H5Fcreate(impl->output->temporary().c_str(), H5F_ACC_TRUNC, creation, access);
-    if (impl->file < 0) throw Error(file.string(), "cannot be written");
+    if (impl->file < 0) throw Error(file.string(), "cannot be written", "check the folder's permissions and the space left on the disk");
     return H5File(std::move(impl));
 }
 
 H5File H5File::open(const std::filesystem::path& file)
 {
     H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
-    if (!std::filesystem::is_regular_file(file)) throw Error(file.string(), "no such file");
+    if (!std::filesystem::is_regular_file(file)) throw Error(file.string(), "no such file", "check the path");
     auto impl = std::make_unique<Impl>();
     impl->path = file;
     const Id access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
     impl->file = H5Fopen(file.c_str(), H5F_ACC_RDONLY, access);
-    if (impl->file < 0) throw Error(file.string(), "is not an HDF5 file, or is damaged");
+    if (impl->file < 0) throw Error(file.string(), "is not an HDF5 file, or is damaged", "make it again with the tool that wrote it, or copy it again");
     return H5File(std::move(impl));
 }
 
@@ -235,13 +268,23 @@ void H5File::write(const std::string& path, std::span<const std::string> data)
     impl_->write(path, packed.data(), data.size(), type, {data.size()});
 }
 
-std::vector<std::size_t> H5File::dims(const std::string& path) const { return impl_->dims(impl_->open_dataset(path)); }
+std::vector<std::size_t> H5File::dims(const std::string& path) const { return impl_->dims(impl_->open_dataset(path), path); }
+
+std::string H5File::number_type(const std::string& path) const
+{
+    const Id dataset = impl_->open_dataset(path);
+    const Id type(H5Dget_type(dataset), H5Tclose);
+    const H5T_class_t kind = H5Tget_class(type);
+    if (kind != H5T_INTEGER && kind != H5T_FLOAT) impl_->fail(path, "holds no numbers");
+    return (kind == H5T_FLOAT ? "f" : H5Tget_sign(type) == H5T_SGN_NONE ? "u" : "i") + std::to_string(8 * H5Tget_size(type));
+}
+
 std::vector<double> H5File::read_doubles(const std::string& path) const { return impl_->read<double>(path, H5T_NATIVE_DOUBLE); }
 
 std::vector<double> H5File::read_doubles(const std::string& path, std::size_t first, std::size_t count) const
 {
     const Id dataset = impl_->open_dataset(path);
-    const std::vector<std::size_t> dims = impl_->dims(dataset);
+    const std::vector<std::size_t> dims = impl_->dims(dataset, path);
     if (dims.empty() || first + count > dims[0]) impl_->fail(path, "is shorter than asked for");
     std::vector<hsize_t> start(dims.size(), 0), block(dims.begin(), dims.end());
     start[0] = first;
@@ -267,7 +310,7 @@ std::vector<std::string> H5File::read_strings(const std::string& path) const
     if (H5Tget_class(type) != H5T_STRING || H5Tis_variable_str(type) > 0) impl_->fail(path, "holds no fixed-length strings");
     const std::size_t length = H5Tget_size(type);
     std::size_t count = 1;
-    for (std::size_t d : impl_->dims(dataset)) count *= d;
+    for (std::size_t d : impl_->dims(dataset, path)) count *= d;
     std::vector<char> packed(length * count);
     if (count > 0 && H5Dread(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, packed.data()) < 0) impl_->fail(path, "is damaged");
     std::vector<std::string> texts;
@@ -311,10 +354,11 @@ bool H5File::has_attribute(const std::string& path, const std::string& name) con
 std::string H5File::string_attribute(const std::string& path, const std::string& name) const
 {
     const Id attribute = impl_->open_attribute(path, name);
-    const Id type(H5Aget_type(attribute), H5Tclose);
-    if (H5Tget_class(type) != H5T_STRING || H5Tis_variable_str(type) > 0) impl_->fail(path, "attribute " + name + " is no text");
+    const Id type(H5Aget_type(attribute), H5Tclose), space(H5Aget_space(attribute), H5Sclose);
+    if (H5Tget_class(type) != H5T_STRING || H5Tis_variable_str(type) > 0 || H5Sget_simple_extent_npoints(space) != 1) impl_->fail_attribute(path, name, "is no text");
+    if (H5Tget_size(type) > std::filesystem::file_size(impl_->file_on_disk())) impl_->fail_attribute(path, name, "is longer than the file");
     std::string value(H5Tget_size(type), '\0');
-    if (H5Aread(attribute, type, value.data()) < 0) impl_->fail(path, "attribute " + name + " is damaged");
+    if (H5Aread(attribute, type, value.data()) < 0) impl_->fail_attribute(path, name, "is damaged");
     value.resize(std::min(value.find('\0'), value.size()));
     return value;
 }
@@ -322,17 +366,38 @@ std::string H5File::string_attribute(const std::string& path, const std::string&
 double H5File::number_attribute(const std::string& path, const std::string& name) const
 {
     const auto values = numbers_attribute(path, name);
-    if (values.size() != 1) impl_->fail(path, "attribute " + name + " is not one number");
+    if (values.size() != 1) impl_->fail_attribute(path, name, "is not one number");
     return values[0];
+}
+
+std::int64_t H5File::integer_attribute(const std::string& path, const std::string& name) const
+{
+    const double value = number_attribute(path, name);
+    if (!(std::abs(value) < 1e15) || value != std::floor(value)) impl_->fail_attribute(path, name, "is no whole number");
+    return std::int64_t(value);
 }
 
 std::vector<double> H5File::numbers_attribute(const std::string& path, const std::string& name) const
 {
     const Id attribute = impl_->open_attribute(path, name);
-    const Id space(H5Aget_space(attribute), H5Sclose);
-    std::vector<double> values(static_cast<std::size_t>(H5Sget_simple_extent_npoints(space)));
-    if (H5Aread(attribute, H5T_NATIVE_DOUBLE, values.data()) < 0) impl_->fail(path, "attribute " + name + " holds no numbers");
+    const Id space(H5Aget_space(attribute), H5Sclose), type(H5Aget_type(attribute), H5Tclose);
+    const hssize_t count = H5Sget_simple_extent_npoints(space);
+    const H5T_class_t kind = H5Tget_class(type);
+    if (count < 0 || (kind != H5T_INTEGER && kind != H5T_FLOAT)) impl_->fail_attribute(path, name, "holds no numbers");
+    if (double(count) * double(H5Tget_size(type)) > double(std::filesystem::file_size(impl_->file_on_disk()))) impl_->fail_attribute(path, name, "is longer than the file");
+    std::vector<double> values(static_cast<std::size_t>(count));
+    if (count > 0 && H5Aread(attribute, H5T_NATIVE_DOUBLE, values.data()) < 0) impl_->fail_attribute(path, name, "holds no numbers");
     return values;
+}
+
+void H5File::set_format(std::int64_t number) { set_attribute("/", "format", number); }
+
+void H5File::require_format(std::int64_t known) const
+{
+    if (!has_attribute("/", "format")) return;
+    const Id attribute = impl_->open_attribute("/", "format");
+    const Id type(H5Aget_type(attribute), H5Tclose);
+    if (H5Tget_class(type) != H5T_STRING) require_known_format(integer_attribute("/", "format"), known, impl_->path.string());
 }
 
 }  // namespace coral

@@ -39,7 +39,10 @@ public:
     /// Fixed-length UTF-8 strings.
     void write(const std::string& path, std::span<const std::string> data);
 
+    /// \throws Error when absent, or when the file stores far less than they ask for
     std::vector<std::size_t> dims(const std::string& path) const;
+    /// Numbers as they are stored: "u16", "i32", "f64" ... \throws Error when absent or of another kind
+    std::string number_type(const std::string& path) const;
     /// Whole dataset, converted to the type asked for. \throws Error when absent or of another kind
     std::vector<double> read_doubles(const std::string& path) const;
     /// `count` entries of the first axis from `first` on, with all of the other axes.
@@ -58,7 +61,13 @@ public:
     bool has_attribute(const std::string& path, const std::string& name) const;
     std::string string_attribute(const std::string& path, const std::string& name) const;
     double number_attribute(const std::string& path, const std::string& name) const;
+    std::int64_t integer_attribute(const std::string& path, const std::string& name) const;
     std::vector<double> numbers_attribute(const std::string& path, const std::string& name) const;
+
+    /// Number of the layout of a file of ours, attribute `format` of the root. It grows when a reader of before would go wrong.
+    void set_format(std::int64_t number);
+    /// \throws Error when the file's number is above `known`; a file without number (or with a text there) is format 1
+    void require_format(std::int64_t known) const;
 
 private:
     struct Impl;

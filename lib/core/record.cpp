@@ -26,4 +26,11 @@ try {
     throw Error(where, "the history of the file is damaged", "make the file again with the tool that wrote it");
 }
 
+void require_known_format(std::int64_t found, std::int64_t known, const std::string& where)
+{
+    if (found > known)
+        throw Error(where, "was written by a newer version of the tools (format " + std::to_string(found) + ", this one reads up to " + std::to_string(known) + ")",
+                    "update the tools");
+}
+
 }  // namespace coral

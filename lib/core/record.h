@@ -1,6 +1,7 @@
 #pragma once
 /// \file core/record.h
 /// History that every file carries: one entry per step of the chain (tool, version, options, seed, inputs).
+#include <cstdint>
 #include <map>
 #include <string>
 #include <vector>
@@ -22,5 +23,8 @@ using History = std::vector<RecordEntry>;
 std::string to_json(const History& history);
 /// \throws Error when the text is not a history
 History history_from_json(const std::string& text, const std::string& where);
+
+/// \throws Error when the layout of a file has a higher number than this program knows: a newer version wrote it
+void require_known_format(std::int64_t found, std::int64_t known, const std::string& where);
 
 }  // namespace coral

@@ -1,0 +1,14 @@
+#pragma once
+/// \file core/formats.h
+/// Numbers of the layouts of our files, which each file carries as `format`. A number grows when a reader of before would go wrong.
+#include <cstdint>
+
+namespace coral::file_format {
+
+inline constexpr std::int64_t grains = 1;      ///< grains.vdb: names, metadata, units
+inline constexpr std::int64_t shapes = 1;      ///< .sh.h5: groups, attributes, units
+inline constexpr std::int64_t sample = 1;      ///< sample.h5: groups, attributes, units
+inline constexpr std::int64_t results = 1;     ///< results.h5: datasets, their dimensions, units
+inline constexpr std::int64_t checkpoint = 1;  ///< checkpoint.h5: attributes, and the bytes of /simulation and /observer
+
+}  // namespace coral::file_format
