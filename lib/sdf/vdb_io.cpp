@@ -12,15 +12,15 @@
 #include <sstream>
 
 #include "core/error.h"
+#include "core/formats.h"
 #include "core/output_file.h"
 #include "core/text.h"
+#include "sdf/detail/vdb_seal.h"
 
 namespace coral::sdf {
 namespace {
 
 constexpr double millimetres = 1e3;  // of one metre; the only place where lengths are not in metres
-
-constexpr std::int32_t format_version = 1;  // of names, metadata and units; files without one are version 1
 
 using openvdb::FloatGrid;
 
@@ -102,64 +102,29 @@ public:
     }
 };
 
-/// Last bytes of a file: OpenVDB takes lengths out of a cut file for memory, without end, so the cut must be seen before it looks.
-constexpr std::string_view end_mark = "coralend";
+/// A lattice holds more bytes than the tree it comes from, but a grain of 10,000 nodes across not a thousand times more.
+constexpr double most_lattice_per_stored = 4096, always_allowed_bytes = 64 << 20;
 
-void append_end_mark(const std::filesystem::path& file)
+/// \throws Error when the lattice is not one that a file of so many bytes can hold
+void require_lattice(const FloatGrid& vdb, const openvdb::Vec3i& first, const openvdb::Vec3i& size, double file_bytes)
 {
-    const std::uint64_t length = std::filesystem::file_size(file);
-    std::ofstream stream(file, std::ios::binary | std::ios::app);
-    stream.write(end_mark.data(), std::streamsize(end_mark.size()));
-    for (int byte = 0; byte < 8; ++byte) stream.put(char(length >> (8 * byte) & 0xff));
-    stream.close();
-    if (!stream) throw Error(file.string(), "could not be written", "check the space left on the disk");
-}
-
-bool ends_as_written(const std::filesystem::path& file)
-{
-    const std::uint64_t size = std::filesystem::file_size(file);
-    if (size < 16) return false;
-    std::array<char, 16> tail{};
-    std::ifstream stream(file, std::ios::binary);
-    stream.seekg(std::streamoff(size - 16));
-    if (!stream.read(tail.data(), 16) || std::string_view(tail.data(), 8) != end_mark) return false;
-    std::uint64_t length = 0;
-    for (int byte = 0; byte < 8; ++byte) length |= std::uint64_t(std::uint8_t(tail[std::size_t(8 + byte)])) << (8 * byte);
-    return length == size - 16;
-}
-
-/// OpenVDB writes a random UUID behind magic number (8 bytes), file version, library version (3 x 4) and a flag (1).
-/// It is replaced by one made from the content, so that the same grains give the same bytes.
-void make_reproducible(const std::filesystem::path& file)
-{
-    constexpr std::streamoff uuid_offset = 21, uuid_length = 36;
-    std::fstream stream(file, std::ios::in | std::ios::out | std::ios::binary);
-    std::string head(std::size_t(uuid_offset + uuid_length), '\0');
-    stream.read(head.data(), std::streamsize(head.size()));
-    const std::size_t at = std::size_t(uuid_offset);
-    if (!stream || head[at + 8] != '-' || head[at + 23] != '-') throw Error(file.string(), "unexpected header written by OpenVDB");
-    std::uint64_t hash[2] = {0xcbf29ce484222325ull, 0x9e3779b97f4a7c15ull};  // FNV-1a from two starts
-    std::vector<char> block(1 << 20);
-    while (stream.read(block.data(), std::streamsize(block.size())), stream.gcount() > 0)
-        for (std::streamsize n = 0; n < stream.gcount(); ++n)
-            for (std::uint64_t& h : hash) h = (h ^ std::uint8_t(block[std::size_t(n)])) * 0x100000001b3ull;
-    std::string uuid;
-    for (int n = 0; n < 32; ++n) {
-        if (n == 8 || n == 12 || n == 16 || n == 20) uuid += '-';
-        uuid += "0123456789abcdef"[hash[n / 16] >> (4 * (n % 16)) & 15];
+    constexpr int far = 1 << 24;
+    double bytes = sizeof(float);
+    bool good = true;
+    for (int a = 0; a < 3; ++a) {
+        good = good && size[a] >= 2 && size[a] < far && first[a] > -far && first[a] < far;
+        bytes *= size[a];
     }
-    stream.clear();
-    stream.seekp(uuid_offset);
-    stream.write(uuid.data(), uuid_length);
-    if (!stream.flush()) throw Error(file.string(), "cannot be written");
+    const double spacing = vdb.metaValue<double>("spacing");
+    if (!good || bytes > std::max(always_allowed_bytes, most_lattice_per_stored * file_bytes) || !(spacing > 0 && spacing < 1))
+        throw Error(vdb.getName(), "its lattice is out of range", "make the file again with csct2ls");
 }
 
-DistanceGrid to_dense(const FloatGrid& vdb)
+DistanceGrid to_dense(const FloatGrid& vdb, double file_bytes)
 {
     DistanceGrid grid;
     const openvdb::Vec3i first = vdb.metaValue<openvdb::Vec3i>("lattice_first"), size = vdb.metaValue<openvdb::Vec3i>("lattice_size");
-    if (size[0] < 2 || size[1] < 2 || size[2] < 2 || std::int64_t(size[0]) * size[1] * size[2] > std::int64_t(1) << 33)
-        throw Error(vdb.getName(), "lattice_size is out of range");
+    require_lattice(vdb, first, size, file_bytes);
     grid.size = Eigen::Vector3i(size[0], size[1], size[2]);
     grid.spacing = vdb.metaValue<double>("spacing");
     const openvdb::Vec3d origin = vdb.indexToWorld(openvdb::Coord(first[0], first[1], first[2])) / millimetres;
@@ -184,7 +149,7 @@ Eigen::Matrix3d read_inertia(const FloatGrid& vdb)
     Eigen::Matrix3d inertia;
     std::istringstream text(vdb.metaValue<std::string>("inertia"));
     for (int n = 0; n < 9; ++n)
-        if (!(text >> inertia(n / 3, n % 3))) throw Error(vdb.getName(), "metadata inertia does not hold nine numbers");
+        if (!(text >> inertia(n / 3, n % 3))) throw Error(vdb.getName(), "metadata inertia does not hold nine numbers", "make the file again with csct2ls");
     return inertia;
 }
 
@@ -233,7 +198,7 @@ void GrainWriter::commit(const History& history)
     openvdb::MetaMap metadata;
     metadata.insertMeta("history", text);
     metadata.insertMeta("content", openvdb::StringMetadata("coralsand grains"));
-    metadata.insertMeta("format_version", openvdb::Int32Metadata(format_version));
+    metadata.insertMeta("format_version", openvdb::Int32Metadata(std::int32_t(file_format::grains)));
     const std::filesystem::path& file = impl_->output.temporary();
     try {
         CheckedArchive().write_file(file, all, metadata);
@@ -242,8 +207,7 @@ void GrainWriter::commit(const History& history)
     } catch (const std::exception& problem) {
         throw Error(target, std::string("could not be written (") + problem.what() + ")", "check the space left on the disk");
     }
-    append_end_mark(file);
-    make_reproducible(file);
+    detail::seal(file);
     impl_->output.commit();
 }
 
@@ -256,8 +220,8 @@ struct GrainReader::Impl {
 GrainReader::GrainReader(const std::filesystem::path& file) : impl_(new Impl{file, {}, {}})
 {
     openvdb::initialize();
-    if (!std::filesystem::is_regular_file(file)) throw Error(file.string(), "no such file");
-    if (!ends_as_written(file)) throw Error(file.string(), "holds no grains of ours, or is cut short", "make it with csct2ls, or copy it again");
+    if (!std::filesystem::is_regular_file(file)) throw Error(file.string(), "no such file", "check the path");
+    detail::require_sealed(file);
     guarded(file, [&] {
         openvdb::io::File vdb(file.string());
         vdb.open(false);
@@ -267,9 +231,7 @@ GrainReader::GrainReader(const std::filesystem::path& file) : impl_(new Impl{fil
         const auto content = metadata->getMetadata<openvdb::StringMetadata>("content");
         if (!content || content->value() != "coralsand grains") throw Error(file.string(), "holds no grains of ours", "make it with csct2ls");
         const auto version = metadata->getMetadata<openvdb::Int32Metadata>("format_version");
-        if (version && version->value() > format_version)
-            throw Error(file.string(), "is of format " + std::to_string(version->value()) + ", this program reads up to " + std::to_string(format_version),
-                        "use the newer version that wrote it: grid metadata `history` names it");
+        if (version) require_known_format(version->value(), file_format::grains, file.string());
         impl_->history = history_from_json(metadata->metaValue<std::string>("history"), file.string());
     });
     std::sort(impl_->ids.begin(), impl_->ids.end());
@@ -296,8 +258,9 @@ GrainLevelSet GrainReader::read(int id) const
         const FloatGrid& solid = *pair[0];
         grain.id = id;
         grain.label = std::uint32_t(solid.metaValue<std::int64_t>("label"));
-        grain.solid = to_dense(solid);
-        grain.apparent = to_dense(*pair[1]);
+        const double file_bytes = double(std::filesystem::file_size(impl_->file));
+        grain.solid = to_dense(solid, file_bytes);
+        grain.apparent = to_dense(*pair[1], file_bytes);
         grain.volume = solid.metaValue<double>("volume");
         grain.apparent_volume = solid.metaValue<double>("apparent_volume");
         grain.equivalent_diameter = solid.metaValue<double>("equivalent_diameter");
