@@ -3,14 +3,14 @@
 #include <functional>
 
 #include "core/error.h"
+#include "core/formats.h"
 #include "core/hdf5.h"
 #include "pack/sample.h"
 
 namespace coral::pack {
 namespace {
 
-constexpr const char* format_name = "coralsand sample";
-constexpr std::int64_t format_version = 1;
+constexpr const char* content = "coralsand sample";
 
 /// Members of Statistics under their names in the file.
 struct Figure {
@@ -220,7 +220,7 @@ ShapeTemplate read_shape(const Reader& in, const std::string& group)
     for (std::size_t i = 0; i < count; ++i) shape.nodes.push_back(row3(nodes, i));
     shape.node_areas = in.numbers(group + "/node_areas", count);
     if (shape.kind != ShapeKind::sh) return shape;
-    shape.degree = static_cast<int>(file.number_attribute(group, "degree"));
+    shape.degree = static_cast<int>(file.integer_attribute(group, "degree"));
     shape.coefficients = in.numbers(group + "/coefficients", std::size_t(shape.degree + 1) * std::size_t(shape.degree + 1));
     return shape;
 }
@@ -316,8 +316,8 @@ void write_sample(const Sample& sample, const std::filesystem::path& path)
 {
     check_indices(sample, path);
     H5File file = H5File::create(path);
-    file.set_attribute("/", "format", format_name);
-    file.set_attribute("/", "version", format_version);
+    file.set_attribute("/", "content", content);
+    file.set_format(file_format::sample);
     file.set_attribute("/", "size", std::span<const double>(sample.size.data(), 3));
     file.set_attribute("/", "gravity", std::span<const double>(sample.gravity.data(), 3));
     for (std::size_t k = 0; k < sample.shapes.size(); ++k) write_shape(file, "/shapes/" + std::to_string(k), sample.shapes[k]);
@@ -346,10 +346,9 @@ Sample read_sample(const std::filesystem::path& path)
 {
     const H5File file = H5File::open(path);
     const Reader in(file);
-    if (!file.has_attribute("/", "format") || file.string_attribute("/", "format") != format_name)
-        in.fail("/", "is not a sample (attribute format is not '" + std::string(format_name) + "')");
-    if (const double version = file.number_attribute("/", "version"); version != double(format_version))
-        in.fail("/", "has version " + std::to_string(int(version)) + ", this program reads " + std::to_string(format_version));
+    file.require_format(file_format::sample);
+    const char* name = file.has_attribute("/", "content") ? "content" : "format";  // the first files had it as a text in `format`
+    if (!file.has_attribute("/", name) || file.string_attribute("/", name) != content) in.fail("/", "is not a sample (attribute content is not '" + std::string(content) + "')");
     Sample sample;
     const auto size = file.numbers_attribute("/", "size"), gravity = file.numbers_attribute("/", "gravity");
     if (size.size() != 3 || gravity.size() != 3) in.fail("/", "attributes size and gravity need three numbers");
@@ -363,10 +362,10 @@ Sample read_sample(const std::filesystem::path& path)
     const std::size_t n = in.count("/psd/size"), m = in.count("/criteria/name");
     const auto sizes = in.numbers("/psd/size", n), passing = in.numbers("/psd/passing", n);
     for (std::size_t i = 0; i < n; ++i) sample.psd.push_back({sizes[i], passing[i]});
-    const auto name = in.strings("/criteria/name", m), verdict = in.strings("/criteria/verdict", m),
+    const auto criterion = in.strings("/criteria/name", m), verdict = in.strings("/criteria/verdict", m),
                definition = in.strings("/criteria/definition", m);
     const auto value = in.numbers("/criteria/value", m, 1, false), threshold = in.numbers("/criteria/threshold", m);
-    for (std::size_t i = 0; i < m; ++i) sample.criteria.push_back({name[i], value[i], threshold[i], verdict[i], definition[i]});
+    for (std::size_t i = 0; i < m; ++i) sample.criteria.push_back({criterion[i], value[i], threshold[i], verdict[i], definition[i]});
     for (const Figure& f : figures) sample.statistics.*f.value = file.number_attribute("/statistics", f.name);
     const auto history = file.read_strings("/history");
     if (history.size() != 1) in.fail("/history", "is not one text");

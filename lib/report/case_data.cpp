@@ -5,6 +5,7 @@
 #include <set>
 
 #include "core/error.h"
+#include "core/formats.h"
 #include "core/hdf5.h"
 #include "core/output_file.h"
 #include "core/text.h"
@@ -124,6 +125,7 @@ CaseData read_case(const fs::path& folder)
     if (!named.has_filename()) named = named.parent_path();
     data.name = named.filename().string();
     const H5File file = H5File::open(results);
+    file.require_format(file_format::results);
     read_series(file, data);
     read_tracks(file, data);
     read_migration(file, data);

@@ -4,6 +4,7 @@
 #include <iterator>
 
 #include "core/error.h"
+#include "core/formats.h"
 #include "core/hdf5.h"
 #include "report/detail/read.h"
 
@@ -72,6 +73,7 @@ void read_sample(const std::filesystem::path& path, CaseData& data)
 {
     try {
         const H5File file = H5File::open(path);
+        file.require_format(file_format::sample);
         std::vector<Body> bodies = bodies_of(file);
         const auto fine = static_cast<std::size_t>(std::ranges::count(bodies, "fine", &Body::role));
         data.setup.push_back({"Grains of the sample", std::to_string(bodies.size() - fine) + " coarse, " + std::to_string(fine) + " fine"});

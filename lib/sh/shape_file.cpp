@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/error.h"
+#include "core/formats.h"
 #include "core/hdf5.h"
 
 namespace coral::sh {
@@ -30,12 +31,12 @@ ShapeRecord read_shape(const H5File& file, const std::string& group, int id)
     ShapeRecord shape;
     shape.id = id;
     shape.surface.coefficients = file.read_doubles(group + "/coefficients");
-    shape.surface.degree = int(file.number_attribute(group, "degree"));
+    shape.surface.degree = int(std::clamp<std::int64_t>(file.integer_attribute(group, "degree"), -1, 1000));
     if (shape.surface.degree < 0 || shape.surface.degree > 200 || int(shape.surface.coefficients.size()) != coefficient_count(shape.surface.degree))
         throw Error(where, std::to_string(shape.surface.coefficients.size()) + " coefficients do not fit degree " + std::to_string(shape.surface.degree),
                     "write the file again with ls2sh");
     const std::vector<double> centre = file.numbers_attribute(group, "centre");
-    if (centre.size() != 3) throw Error(where, "attribute centre does not hold three numbers");
+    if (centre.size() != 3) throw Error(where, "attribute centre does not hold three numbers", "write the file again with ls2sh");
     shape.surface.centre = Eigen::Vector3d(centre[0], centre[1], centre[2]);
     shape.surface.scale = file.number_attribute(group, "scale");
     shape.surface.method = file.string_attribute(group, "method");
@@ -53,6 +54,7 @@ void write_shapes(const std::filesystem::path& path, std::span<const ShapeRecord
 {
     H5File file = H5File::create(path);
     file.set_attribute("/", "content", "coralsand harmonic shapes");
+    file.set_format(file_format::shapes);
     file.set_attribute("/", "convention", convention);
     file.set_attribute("/", "history", to_json(history));
     file.make_group("/shapes");
@@ -78,11 +80,13 @@ void write_shapes(const std::filesystem::path& path, std::span<const ShapeRecord
 ShapeFile read_shapes(const std::filesystem::path& path)
 {
     const H5File file = H5File::open(path);
+    file.require_format(file_format::shapes);
     if (!file.exists("/shapes") || !file.has_attribute("/", "history")) throw Error(path.string(), "holds no /shapes of ours", "make it with ls2sh");
     ShapeFile result;
     result.history = history_from_json(file.string_attribute("/", "history"), path.string());
     for (const std::string& name : file.members("/shapes")) {
-        if (name.empty() || name.find_first_not_of("0123456789") != std::string::npos) throw Error(path.string(), "/shapes/" + name + " is no shape number");
+        if (name.empty() || name.size() > 9 || name.find_first_not_of("0123456789") != std::string::npos)
+            throw Error(path.string(), "/shapes/" + name + " is no shape number", "write the file again with ls2sh");
         result.shapes.push_back(read_shape(file, "/shapes/" + name, std::stoi(name)));
     }
     std::sort(result.shapes.begin(), result.shapes.end(), [](const ShapeRecord& a, const ShapeRecord& b) { return a.id < b.id; });

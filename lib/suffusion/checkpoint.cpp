@@ -1,20 +1,17 @@
 #include "suffusion/checkpoint.h"
 
+#include <algorithm>
+
 #include "core/error.h"
+#include "core/formats.h"
 #include "core/hdf5.h"
 
 namespace coral::suffusion {
 
-namespace {
-
-constexpr std::int64_t format_version = 1;
-
-}  // namespace
-
 void write_checkpoint(const std::filesystem::path& file, const Checkpoint& checkpoint)
 {
     H5File h5 = H5File::create(file);
-    h5.set_attribute("/", "format_version", format_version);
+    h5.set_format(file_format::checkpoint);
     h5.set_attribute("/", "time", checkpoint.time);
     h5.set_attribute("/", "rows", static_cast<std::int64_t>(checkpoint.rows));
     h5.set_attribute("/", "frames", static_cast<std::int64_t>(checkpoint.frames));
@@ -28,9 +25,9 @@ void write_checkpoint(const std::filesystem::path& file, const Checkpoint& check
 Checkpoint read_checkpoint(const std::filesystem::path& file)
 {
     const H5File h5 = H5File::open(file);
-    if (!h5.has_attribute("/", "format_version") || h5.number_attribute("/", "format_version") != format_version)
-        throw Error(file.string(), "is no checkpoint of this version", "run without --resume to start anew");
-    const auto count = [&](const char* name) { return static_cast<std::size_t>(h5.number_attribute("/", name)); };
+    h5.require_format(file_format::checkpoint);
+    if (!h5.exists("/simulation") || !h5.exists("/observer")) throw Error(file.string(), "is no checkpoint", "run without --resume to start anew");
+    const auto count = [&](const char* name) { return static_cast<std::size_t>(std::max<std::int64_t>(h5.integer_attribute("/", name), 0)); };
     Checkpoint checkpoint;
     checkpoint.time = h5.number_attribute("/", "time");
     checkpoint.rows = count("rows");

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/error.h"
+#include "core/formats.h"
 #include "core/hdf5.h"
 
 namespace coral::suffusion {
@@ -21,7 +22,7 @@ Column read_column(const H5File& h5, const std::string& group, const std::string
 {
     const std::string path = group + "/" + name;
     const std::vector<std::size_t> dims = h5.dims(path);
-    return {name, h5.string_attribute(path, "unit"), dims.size() > plain_rank ? dims.back() : 1, h5.read_doubles(path)};
+    return {name, h5.string_attribute(path, "unit"), dims.size() > plain_rank ? std::max<std::size_t>(dims.back(), 1) : 1, h5.read_doubles(path)};
 }
 
 }  // namespace
@@ -45,6 +46,7 @@ void Results::truncate(std::size_t count)
 void write_results(const std::filesystem::path& file, const Results& results)
 {
     H5File h5 = H5File::create(file);
+    h5.set_format(file_format::results);
     const std::size_t rows = results.rows(), bodies = results.tracked.size();
     // By name, so that the file does not depend on whether the run was resumed.
     std::vector<const Column*> series;
@@ -73,6 +75,7 @@ void write_results(const std::filesystem::path& file, const Results& results)
 Results read_results(const std::filesystem::path& file)
 {
     const H5File h5 = H5File::open(file);
+    h5.require_format(file_format::results);
     if (!h5.exists("/series/time") || !h5.exists("/trajectories/id"))
         throw Error(file.string(), "holds no /series/time: it is not a results file", "run suffuse without --resume to start anew");
     Results results;

@@ -145,7 +145,7 @@ TEST(SampleFile, is_refused_when_damaged)
     const auto foreign = scratch("foreign.h5");
     {
         auto file = coral::H5File::create(foreign);
-        file.set_attribute("/", "format", "something else");
+        file.set_attribute("/", "content", "something else");
         file.commit();
     }
     try {
