@@ -17,6 +17,7 @@ namespace {
 
 constexpr std::size_t piece_bytes = std::size_t{1} << 22;  // a multiple of every number size
 constexpr const char* truncated_hint = "the file is truncated; copy it again";
+constexpr const char* three_dimensions_hint = "export it as a stack of three dimensions, one number a voxel";
 
 NumberType number_type(const std::string& name, const std::string& where)
 {
@@ -48,7 +49,7 @@ void read_plain(std::istream& in, std::size_t total, const std::string& where, c
 void read_deflated(std::istream& in, std::size_t total, const std::string& where, const std::function<void(std::span<const std::byte>)>& take)
 {
     z_stream z{};
-    if (inflateInit2(&z, 15 + 32) != Z_OK) throw Error(where, "zlib cannot start");
+    if (inflateInit2(&z, 15 + 32) != Z_OK) throw Error(where, "zlib cannot start", "close other programs: memory may be short");
     const std::unique_ptr<z_stream, int (*)(z_stream*)> closer(&z, inflateEnd);
     std::vector<std::byte> packed(std::size_t{1} << 18), piece(std::min(total, piece_bytes));
     std::size_t done = 0;
@@ -73,14 +74,74 @@ void read_deflated(std::istream& in, std::size_t total, const std::string& where
     }
 }
 
-/// Reads the voxels of a stack whose size is set.
-void read_voxels(VoxelStack& stack, std::istream& in, const NumberType& type, bool deflated, const std::string& where)
+/// Bytes of a stream from where it stands to its end.
+std::size_t bytes_left(std::istream& in)
 {
+    const auto here = in.tellg();
+    in.seekg(0, std::ios::end);
+    const auto end = in.tellg();
+    in.seekg(here);
+    return here < 0 || end < here ? 0 : std::size_t(end - here);
+}
+
+/// Holds what a header asks for against what is there, before memory is taken for it. Deflate packs 1032 : 1 at best.
+void require_data(std::size_t wanted, std::size_t found, bool deflated, const std::string& where)
+{
+    constexpr double most_unpacked_per_packed = 1032, stream_overhead = 64;
+    const std::string announced = "asks for " + std::to_string(wanted) + " bytes of voxels, ", there = std::to_string(found) + " bytes ";
+    if (deflated && double(wanted) > most_unpacked_per_packed * (double(found) + stream_overhead))
+        throw Error(where, announced + "which the " + there + "of compressed data cannot hold", "compare size and type in the header; the file may be truncated: copy it again");
+    if (!deflated && wanted > found) throw Error(where, announced + "but only " + there + "follow", "compare size and type in the header; the file may be truncated: copy it again");
+    if (!deflated && wanted < found)
+        throw Error(where, announced + "but " + there + "follow", "compare size and type in the header; one number a voxel is read, without colours or channels");
+}
+
+/// Where the voxels lie: behind `lines` lines and then `bytes` bytes; -1 bytes: at the end of the file.
+struct Skip {
+    double lines = 0, bytes = 0;
+};
+
+void skip(std::istream& in, const Skip& skip, std::size_t wanted, const std::string& where)
+{
+    if (!(skip.lines >= 0 && skip.lines <= 1e6 && skip.bytes >= -1 && skip.bytes <= 1e15))
+        throw Error(where, "the header skips an impossible number of lines or bytes", "correct it, or leave it out");
+    std::string line;
+    for (int n = 0; n < int(skip.lines) && std::getline(in, line);) ++n;
+    in.clear();
+    if (skip.bytes == -1) in.seekg(-std::streamoff(std::min(wanted, bytes_left(in))), std::ios::end);
+    else if (skip.bytes > 0) in.seekg(std::streamoff(skip.bytes), std::ios::cur);
+}
+
+/// A stack that waits to be read: its header, and its file where the voxels begin.
+struct Opened {
+    StackHeader header;
+    NumberType type;
+    bool deflated = false;
+    std::ifstream in;
+    std::string where;
+
+    std::size_t bytes() const { return voxel_count(header.size) * std::size_t(type.bytes); }
+    /// Goes to the voxels and holds what the header asks for against what is there.
+    void find_voxels(const Skip& before)
+    {
+        header.type = to_string(type);
+        skip(in, before, bytes(), where);
+        require_data(bytes(), bytes_left(in), deflated, where);
+    }
+};
+
+VoxelStack read_voxels(Opened&& file)
+{
+    VoxelStack stack;
+    stack.name = file.header.name;
+    stack.size = file.header.size;
+    stack.voxel_size = file.header.voxel_size;
     VoxelSink sink(stack.name);
-    sink.reserve(stack.count(), type.bytes);
-    const auto take = [&](std::span<const std::byte> bytes) { sink.append(bytes, type, where); };
-    (deflated ? read_deflated : read_plain)(in, stack.count() * std::size_t(type.bytes), where, take);
+    sink.reserve(stack.count(), file.type.bytes);
+    const auto take = [&](std::span<const std::byte> bytes) { sink.append(bytes, file.type, file.where); };
+    (file.deflated ? read_deflated : read_plain)(file.in, file.bytes(), file.where, take);
     sink.finish(stack);
+    return stack;
 }
 
 std::string lower(std::string text)
@@ -100,16 +161,34 @@ std::vector<double> numbers(const std::string& text)
 Eigen::Vector3i size_from(const std::string& text, const std::string& where)
 {
     const std::vector<double> n = numbers(text);
-    if (n.size() != 3 || *std::min_element(n.begin(), n.end()) < 1 || *std::max_element(n.begin(), n.end()) > 1e6)
-        throw Error(where, "has the size '" + text + "' where three positive numbers are needed");
+    if (n.size() != 3 || !std::ranges::all_of(n, [](double edge) { return edge >= 1 && edge <= 1e6; }))
+        throw Error(where, "has the size '" + text + "' where three numbers from 1 to 1000000 are needed", three_dimensions_hint);
     return {int(n[0]), int(n[1]), int(n[2])};
 }
 
 std::ifstream open_binary(const std::filesystem::path& file)
 {
+    if (!std::filesystem::is_regular_file(file)) throw Error(file.string(), "is no file", "check the path");
     std::ifstream in(file, std::ios::binary);
-    if (!in) throw Error(file.string(), "cannot be opened");
+    if (!in) throw Error(file.string(), "cannot be opened", "check that you may read it");
     return in;
+}
+
+/// The file of voxels that a header names.
+std::ifstream open_data(const std::filesystem::path& header, const std::string& name)
+{
+    const std::filesystem::path file = header.parent_path() / name;
+    if (name.starts_with("LIST") || name.find('%') != std::string::npos)
+        throw Error(header.string(), "spreads its voxels over several files ('" + name + "')", "export it as one file, or as a folder of TIFF slices");
+    if (!std::filesystem::is_regular_file(file))
+        throw Error(header.string(), "names the data file '" + name + "', which is not there", "copy it beside the header, or correct the name");
+    return open_binary(file);
+}
+
+/// As the file says it, right or wrong; zero, which means unknown, without unit or three numbers.
+Eigen::Vector3d voxel_size_from(double unit, const std::vector<double>& spacing)
+{
+    return unit > 0 && spacing.size() == 3 ? Eigen::Vector3d(unit * Eigen::Vector3d(spacing[0], spacing[1], spacing[2])) : Eigen::Vector3d::Zero();
 }
 
 bool machine_is_big() { return std::endian::native == std::endian::big; }
@@ -158,101 +237,129 @@ Eigen::Vector3d direction_lengths(const std::string& text)
     return lengths;
 }
 
-}  // namespace
-
-VoxelStack read_nrrd(const std::filesystem::path& file)
+std::string datasets_of(const H5File& h5)
 {
-    const std::string where = file.string();
-    std::ifstream in = open_binary(file);
-    std::string magic;
-    if (!std::getline(in, magic) || !magic.starts_with("NRRD")) throw Error(where, "is no NRRD file");
-    auto fields = read_fields(in, ':', "");
-    for (const char* key : {"type", "dimension", "sizes", "encoding"})
-        if (!fields.contains(key)) throw Error(where, std::string("the header lacks '") + key + "'", truncated_hint);
-    if (fields["dimension"] != "3") throw Error(where, "has " + fields["dimension"] + " dimensions, not 3");
-    VoxelStack stack;
-    stack.name = file.filename().string();
-    stack.size = size_from(fields["sizes"], where);
-    const std::string type_name = nrrd_type(fields["type"]);
-    if (type_name.empty()) throw Error(where, "holds the unsupported type '" + fields["type"] + "'", "save it as 8, 16 or 32-bit integers");
-    NumberType type = number_type(type_name, where);
-    type.swapped = (fields["endian"] == "big") != machine_is_big();
-    const std::string encoding = lower(fields["encoding"]);
-    const bool deflated = encoding == "gzip" || encoding == "gz";
-    if (!deflated && encoding != "raw") throw Error(where, "has the unsupported encoding '" + encoding + "'", "save it as raw or gzip");
-
-    double unit = 0;
-    if (fields.contains("space units")) unit = metres_per_unit(split(fields["space units"], ' ').front());
-    if (unit > 0 && fields.contains("space directions")) stack.voxel_size = unit * direction_lengths(fields["space directions"]);
-    else if (unit > 0 && fields.contains("spacings"))
-        if (const std::vector<double> s = numbers(fields["spacings"]); s.size() == 3) stack.voxel_size = unit * Eigen::Vector3d(s[0], s[1], s[2]);
-
-    for (const char* key : {"data file", "datafile"})
-        if (fields.contains(key)) in = open_binary(file.parent_path() / fields[key]);
-    read_voxels(stack, in, type, deflated, where);
-    return stack;
+    std::string names;
+    for (const std::string& name : h5.members("/")) names += (names.empty() ? "/" : ", /") + name;
+    return names.empty() ? "none" : names.size() > 200 ? names.substr(0, 200) + " ..." : names;
 }
 
-VoxelStack read_metaimage(const std::filesystem::path& file)
+Opened open_nrrd(const std::filesystem::path& path)
 {
-    const std::string where = file.string();
-    std::ifstream in = open_binary(file);
-    auto fields = read_fields(in, '=', "elementdatafile");
-    for (const char* key : {"dimsize", "elementtype", "elementdatafile"})
+    Opened file{{}, {}, false, open_binary(path), path.string()};
+    const std::string& where = file.where;
+    std::string magic;
+    if (!std::getline(file.in, magic) || !magic.starts_with("NRRD"))
+        throw Error(where, "is no NRRD file: it does not begin with 'NRRD'", "export it as NRRD, or give it the ending of its kind");
+    auto fields = read_fields(file.in, ':', "");
+    for (const char* key : {"type", "dimension", "sizes", "encoding"})
         if (!fields.contains(key)) throw Error(where, std::string("the header lacks '") + key + "'", truncated_hint);
+    if (fields["dimension"] != "3") throw Error(where, "has " + fields["dimension"] + " dimensions, not 3", three_dimensions_hint);
+    file.header.name = path.filename().string();
+    file.header.size = size_from(fields["sizes"], where);
+    const std::string type_name = nrrd_type(fields["type"]);
+    if (type_name.empty()) throw Error(where, "holds the unsupported type '" + fields["type"] + "'", "save it as 8, 16 or 32-bit integers");
+    file.type = number_type(type_name, where);
+    file.type.swapped = (fields["endian"] == "big") != machine_is_big();
+    const std::string encoding = lower(fields["encoding"]);
+    file.deflated = encoding == "gzip" || encoding == "gz";
+    if (!file.deflated && encoding != "raw") throw Error(where, "has the unsupported encoding '" + encoding + "'", "save it as raw or gzip");
+
+    const double unit = fields.contains("space units") ? metres_per_unit(split(fields["space units"], ' ').front()) : 0;
+    if (fields.contains("space directions")) {
+        const Eigen::Vector3d lengths = direction_lengths(fields["space directions"]);
+        file.header.voxel_size = voxel_size_from(unit, {lengths.x(), lengths.y(), lengths.z()});
+    } else {
+        file.header.voxel_size = voxel_size_from(unit, numbers(fields["spacings"]));
+    }
+    for (const char* key : {"data file", "datafile"})
+        if (fields.contains(key)) file.in = open_data(path, fields[key]);
+    const auto number = [&](const char* key, const char* other) { return std::atof((fields.contains(key) ? fields[key] : fields[other]).c_str()); };
+    const Skip before{number("line skip", "lineskip"), number("byte skip", "byteskip")};
+    if (file.deflated && before.bytes != 0) throw Error(where, "skips bytes of compressed data", "save it as raw, or without 'byte skip'");
+    file.find_voxels(before);
+    return file;
+}
+
+Opened open_metaimage(const std::filesystem::path& path)
+{
+    Opened file{{}, {}, false, open_binary(path), path.string()};
+    auto fields = read_fields(file.in, '=', "elementdatafile");
+    for (const char* key : {"dimsize", "elementtype", "elementdatafile"})
+        if (!fields.contains(key)) throw Error(file.where, std::string("the header lacks '") + key + "'", truncated_hint);
     static const std::map<std::string, std::string> names{{"MET_UCHAR", "u8"}, {"MET_CHAR", "i8"}, {"MET_USHORT", "u16"}, {"MET_SHORT", "i16"},
                                                           {"MET_UINT", "u32"}, {"MET_INT", "i32"}, {"MET_FLOAT", "f32"}, {"MET_DOUBLE", "f64"}};
     const auto found = names.find(fields["elementtype"]);
-    if (found == names.end()) throw Error(where, "holds the unsupported type '" + fields["elementtype"] + "'", "save it as 8, 16 or 32-bit integers");
-    VoxelStack stack;
-    stack.name = file.filename().string();
-    stack.size = size_from(fields["dimsize"], where);
-    NumberType type = number_type(found->second, where);
+    if (found == names.end()) throw Error(file.where, "holds the unsupported type '" + fields["elementtype"] + "'", "save it as 8, 16 or 32-bit integers");
+    file.header.name = path.filename().string();
+    file.header.size = size_from(fields["dimsize"], file.where);
+    file.type = number_type(found->second, file.where);
     const bool big = lower(fields["binarydatabyteordermsb"]) == "true" || lower(fields["elementbyteordermsb"]) == "true";
-    type.swapped = big != machine_is_big();
-    const double unit = metres_per_unit(fields["distanceunits"]);
-    if (const std::vector<double> s = numbers(fields["elementspacing"]); unit > 0 && s.size() == 3)
-        stack.voxel_size = unit * Eigen::Vector3d(s[0], s[1], s[2]);
-    if (fields["elementdatafile"] != "LOCAL") in = open_binary(file.parent_path() / fields["elementdatafile"]);
-    read_voxels(stack, in, type, lower(fields["compresseddata"]) == "true", where);
-    return stack;
+    file.type.swapped = big != machine_is_big();
+    file.header.voxel_size = voxel_size_from(metres_per_unit(fields["distanceunits"]), numbers(fields["elementspacing"]));
+    file.deflated = lower(fields["compresseddata"]) == "true";
+    const bool apart = fields["elementdatafile"] != "LOCAL";
+    if (apart) file.in = open_data(path, fields["elementdatafile"]);
+    file.find_voxels({0, apart ? std::atof(fields["headersize"].c_str()) : 0});
+    return file;
 }
 
-VoxelStack read_raw(const std::filesystem::path& file, const RawLayout& layout)
+Opened open_raw(const std::filesystem::path& path, const RawLayout& layout)
 {
-    VoxelStack stack;
-    stack.name = file.filename().string();
-    stack.size = layout.size;
-    NumberType type = number_type(layout.type, "--type");
-    type.swapped = machine_is_big();
-    const std::size_t wanted = voxel_count(layout.size) * std::size_t(type.bytes), found = std::filesystem::file_size(file);
-    if (found != wanted)
-        throw Error(file.string(), "has " + std::to_string(found) + " bytes where --shape and --type need " + std::to_string(wanted), "check both options");
-    std::ifstream in = open_binary(file);
-    read_voxels(stack, in, type, false, file.string());
-    return stack;
+    Opened file{{}, number_type(layout.type, "--type"), false, open_binary(path), path.string()};
+    file.header.name = path.filename().string();
+    file.header.size = layout.size;
+    file.header.type = layout.type;
+    file.type.swapped = machine_is_big();
+    if (const std::size_t found = std::filesystem::file_size(path); found != file.bytes())
+        throw Error(path.string(), "has " + std::to_string(found) + " bytes where --shape and --type need " + std::to_string(file.bytes()), "check both options");
+    return file;
 }
+
+/// \throws Error unless the dataset is one of voxels
+StackHeader header_of(const H5File& h5, const std::string& dataset)
+{
+    const std::string where = h5.path().string() + ":" + dataset;
+    if (!h5.exists(dataset)) throw Error(where, "there is no such dataset", "the file has " + datasets_of(h5) + "; write file.h5:/dataset");
+    const std::vector<std::size_t> dims = h5.dims(dataset);
+    if (dims.size() != 3) throw Error(where, "has " + std::to_string(dims.size()) + " dimensions, not 3", "give a dataset of voxels [nz, ny, nx]");
+    if (!std::ranges::all_of(dims, [](std::size_t edge) { return edge >= 1 && edge <= 1000000; }))
+        throw Error(where, "has edges that are not 1 to 1000000 voxels", "give a dataset of voxels [nz, ny, nx]");
+    StackHeader header;
+    header.name = h5.path().filename().string() + ":" + dataset;
+    header.size = {int(dims[2]), int(dims[1]), int(dims[0])};
+    header.type = h5.number_type(dataset);
+    if (h5.has_attribute(dataset, "voxel_size")) {
+        const std::vector<double> s = h5.numbers_attribute(dataset, "voxel_size");
+        header.voxel_size = voxel_size_from(1, s.size() == 1 ? std::vector(3, s[0]) : s);
+    }
+    return header;
+}
+
+}  // namespace
+
+VoxelStack read_nrrd(const std::filesystem::path& file) { return read_voxels(open_nrrd(file)); }
+VoxelStack read_metaimage(const std::filesystem::path& file) { return read_voxels(open_metaimage(file)); }
+VoxelStack read_raw(const std::filesystem::path& file, const RawLayout& layout) { return read_voxels(open_raw(file, layout)); }
+StackHeader nrrd_header(const std::filesystem::path& file) { return open_nrrd(file).header; }
+StackHeader metaimage_header(const std::filesystem::path& file) { return open_metaimage(file).header; }
+StackHeader raw_header(const std::filesystem::path& file, const RawLayout& layout) { return open_raw(file, layout).header; }
+StackHeader hdf5_header(const std::filesystem::path& file, const std::string& dataset) { return header_of(H5File::open(file), dataset); }
 
 VoxelStack read_hdf5(const std::filesystem::path& file, const std::string& dataset)
 {
-    const std::string where = file.string() + ":" + dataset;
     const H5File h5 = H5File::open(file);
-    if (!h5.exists(dataset)) throw Error(where, "the dataset does not exist");
-    const std::vector<std::size_t> dims = h5.dims(dataset);
-    if (dims.size() != 3) throw Error(where, "has " + std::to_string(dims.size()) + " dimensions, not 3");
+    const StackHeader header = header_of(h5, dataset);
     VoxelStack stack;
-    stack.name = file.filename().string() + ":" + dataset;
-    stack.size = {int(dims[2]), int(dims[1]), int(dims[0])};
-    if (h5.has_attribute(dataset, "voxel_size")) {
-        const std::vector<double> s = h5.numbers_attribute(dataset, "voxel_size");
-        if (s.size() == 1) stack.voxel_size.setConstant(s[0]);
-        else if (s.size() == 3) stack.voxel_size = {s[0], s[1], s[2]};
-    }
-    constexpr std::size_t slab = 16;  // planes at a time: chunks are mostly that deep, and doubles take eight bytes
+    stack.name = header.name;
+    stack.size = header.size;
+    stack.voxel_size = header.voxel_size;
+    // Planes at a time: chunks are mostly 16 deep, and doubles take eight bytes.
+    const std::size_t planes = std::size_t(header.size.z()), plane = stack.count() / planes, slab = std::clamp<std::size_t>((std::size_t{1} << 24) / plane, 1, 16);
     VoxelSink sink(stack.name);
-    for (std::size_t k = 0; k < dims[0]; k += slab) {
-        const std::vector<double> values = h5.read_doubles(dataset, k, std::min(slab, dims[0] - k));
-        sink.append(std::as_bytes(std::span(values)), {NumberKind::real, 8}, where);
+    for (std::size_t k = 0; k < planes; k += slab) {
+        const std::vector<double> values = h5.read_doubles(dataset, k, std::min(slab, planes - k));
+        sink.append(std::as_bytes(std::span(values)), {NumberKind::real, 8}, file.string() + ":" + dataset);
     }
     sink.finish(stack);
     return stack;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <map>
 
 #include "core/error.h"
 #include "morph/detail/readers.h"
@@ -36,7 +37,8 @@ void require_consecutive(const std::vector<fs::path>& slices, const std::string&
 {
     for (std::size_t i = 1; i < slices.size(); ++i) {
         const long long before = slice_number(slices[i - 1]), here = slice_number(slices[i]);
-        if (before < 0 || here < 0) throw Error(where, "slice " + slices[before < 0 ? i - 1 : i].filename().string() + " has no number in its name");
+        if (before < 0 || here < 0) throw Error(where, "slice " + slices[before < 0 ? i - 1 : i].filename().string() + " has no number in its name",
+                                                "number the slices in their order, as in slice_0001.tif");
         if (here == before + 1) continue;
         const std::string between = slices[i - 1].filename().string() + " and " + slices[i].filename().string();
         if (here <= before) throw Error(where, "slices " + between + " have the same number", "keep one stack per folder");
@@ -45,23 +47,51 @@ void require_consecutive(const std::vector<fs::path>& slices, const std::string&
     }
 }
 
-VoxelStack read_slices(std::vector<fs::path> slices, const std::string& where)
+/// Slices in natural order. \throws Error when one is missing, doubled or no TIFF
+void put_in_order(std::vector<fs::path>& slices, const std::string& where)
 {
+    for (const fs::path& file : slices)
+        if (!is_tiff(file)) throw Error(file.string(), "is no .tif or .tiff, and of several files each must be one slice", "give the slices as TIFF, or one stack at a time");
     std::sort(slices.begin(), slices.end(), [](const fs::path& a, const fs::path& b) { return natural_less(a.filename().string(), b.filename().string()); });
     require_consecutive(slices, where);
+}
+
+/// Counts a slice as the next plane of a stack; the first gives it its size. \throws Error when it does not fit
+template <class Stack>
+void count_slice(Stack& stack, const Stack& slice, const fs::path& file, const std::string& where)
+{
+    if (slice.size.z() != 1) throw Error(file.string(), "holds " + std::to_string(slice.size.z()) + " pages, but a slice has one", "give stacks one at a time");
+    if (stack.size.z() == 0) {
+        stack.size = slice.size;
+        stack.size.z() = 0;
+        stack.voxel_size = slice.voxel_size;
+        stack.name = fs::path(where).filename().string();
+    }
+    if (slice.size.x() != stack.size.x() || slice.size.y() != stack.size.y())
+        throw Error(file.string(), "is " + std::to_string(slice.size.x()) + " x " + std::to_string(slice.size.y()) + " where the slices before are " +
+                                       std::to_string(stack.size.x()) + " x " + std::to_string(stack.size.y()), "all slices must have one size");
+    ++stack.size.z();
+}
+
+StackHeader slices_header(std::vector<fs::path> slices, const std::string& where)
+{
+    put_in_order(slices, where);
+    StackHeader stack;
+    for (const fs::path& file : slices) {
+        const StackHeader slice = detail::tiff_header(file);
+        count_slice(stack, slice, file, where);
+        stack.type = slice.type;
+    }
+    return stack;
+}
+
+VoxelStack read_slices(std::vector<fs::path> slices, const std::string& where)
+{
+    put_in_order(slices, where);
     VoxelStack stack;
     for (const fs::path& file : slices) {
-        VoxelStack slice = detail::read_tiff(file);
-        if (slice.size.z() != 1) throw Error(file.string(), "holds " + std::to_string(slice.size.z()) + " pages, but a slice has one", "give stacks one at a time");
-        if (stack.size.z() == 0) {
-            stack.size = slice.size;
-            stack.size.z() = 0;
-            stack.voxel_size = slice.voxel_size;
-            stack.name = fs::path(where).filename().string();
-        }
-        if (slice.size.x() != stack.size.x() || slice.size.y() != stack.size.y())
-            throw Error(file.string(), "is " + std::to_string(slice.size.x()) + " x " + std::to_string(slice.size.y()) + " where the slices before are " +
-                                           std::to_string(stack.size.x()) + " x " + std::to_string(stack.size.y()), "all slices must have one size");
+        const VoxelStack slice = detail::read_tiff(file);
+        count_slice(stack, slice, file, where);
         if (!slice.reals.empty() || !stack.reals.empty()) {  // the first slice with fractions turns the stack into reals
             if (stack.reals.empty()) stack.reals.assign(stack.values.begin(), stack.values.end());
             stack.values = {};
@@ -70,9 +100,19 @@ VoxelStack read_slices(std::vector<fs::path> slices, const std::string& where)
         } else {
             stack.values.append(slice.values);
         }
-        ++stack.size.z();
     }
     return stack;
+}
+
+/// Kinds of the files in a folder, for a message: " but 3 .png, 1 .txt".
+std::string contents_of(const fs::path& folder)
+{
+    std::map<std::string, int> kinds;
+    for (const auto& entry : fs::directory_iterator(folder))
+        if (entry.is_regular_file()) ++kinds[entry.path().has_extension() ? extension(entry.path()) : "without ending"];
+    std::string text;
+    for (const auto& [kind, count] : kinds) text += (text.empty() ? " but " : ", ") + std::to_string(count) + " " + kind;
+    return text.size() > 120 ? text.substr(0, 120) + " ..." : text;
 }
 
 std::vector<fs::path> slices_of(const fs::path& folder)
@@ -80,22 +120,55 @@ std::vector<fs::path> slices_of(const fs::path& folder)
     std::vector<fs::path> slices;
     for (const auto& entry : fs::directory_iterator(folder))
         if (entry.is_regular_file() && is_tiff(entry.path()) && entry.path().filename().string().front() != '.') slices.push_back(entry.path());
-    if (slices.empty()) throw Error(folder.string(), "holds no .tif slices", "give a folder of TIFF slices");
+    if (slices.empty()) throw Error(folder.string(), "holds no .tif or .tiff slices" + contents_of(folder), "export the slices as TIFF, or give the file of the stack itself");
     return slices;
 }
 
-VoxelStack read_file(const fs::path& file, const std::optional<RawLayout>& layout)
+/// Readers of every kind of stack, for its voxels or for its header alone.
+template <class Stack>
+struct Readers {
+    Stack (*tiff)(const fs::path&);
+    Stack (*nrrd)(const fs::path&);
+    Stack (*metaimage)(const fs::path&);
+    Stack (*raw)(const fs::path&, const RawLayout&);
+    Stack (*hdf5)(const fs::path&, const std::string&);
+    Stack (*slices)(std::vector<fs::path>, const std::string&);
+};
+constexpr Readers<VoxelStack> voxel_readers{detail::read_tiff, detail::read_nrrd, detail::read_metaimage, detail::read_raw, detail::read_hdf5, read_slices};
+constexpr Readers<StackHeader> header_readers{detail::tiff_header, detail::nrrd_header, detail::metaimage_header, detail::raw_header, detail::hdf5_header, slices_header};
+
+template <class Stack>
+Stack read_file(const Readers<Stack>& read, const fs::path& file, const std::optional<RawLayout>& layout)
 {
     const std::string kind = extension(file);
-    if (is_tiff(file)) return detail::read_tiff(file);
-    if (kind == ".nrrd" || kind == ".nhdr") return detail::read_nrrd(file);
-    if (kind == ".mhd" || kind == ".mha") return detail::read_metaimage(file);
+    if (is_tiff(file)) return read.tiff(file);
+    if (kind == ".nrrd" || kind == ".nhdr") return read.nrrd(file);
+    if (kind == ".mhd" || kind == ".mha") return read.metaimage(file);
     if (kind == ".raw") {
         if (!layout) throw UsageError(file.string(), "a .raw file does not say its size", "add --shape nx,ny,nz --type u8");
-        return detail::read_raw(file, *layout);
+        return read.raw(file, *layout);
     }
-    if (kind == ".h5" || kind == ".hdf5") throw UsageError(file.string(), "the dataset is missing", "write file.h5:/dataset");
+    if (kind == ".h5" || kind == ".hdf5") throw UsageError(file.string(), "is HDF5, without a dataset", "write " + file.string() + ":/dataset");
     throw UsageError(file.string(), "unknown kind of stack '" + kind + "'", "give .tif, .nrrd, .mhd, .mha, .raw, file.h5:/dataset or a folder of .tif slices");
+}
+
+template <class Stack>
+Stack read_any(const Readers<Stack>& read, std::span<const std::string> paths, const std::optional<RawLayout>& layout)
+{
+    if (paths.empty()) throw UsageError("STACK", "no input is given", "name a stack, a folder of slices or several slices");
+    if (paths.size() == 1) {
+        const auto at = paths[0].rfind(":/");
+        if (at != std::string::npos && !fs::exists(paths[0])) {
+            const fs::path file = paths[0].substr(0, at);
+            if (!fs::exists(file)) throw UsageError(file.string(), "no such file", "check the path");
+            return read.hdf5(file, paths[0].substr(at + 1));
+        }
+    }
+    for (const std::string& path : paths)
+        if (!fs::exists(path)) throw UsageError(path, "no such file or folder", "check the path");
+    if (paths.size() > 1) return read.slices({paths.begin(), paths.end()}, fs::path(paths[0]).parent_path().string().empty() ? "slices" : fs::path(paths[0]).parent_path().string());
+    if (fs::is_directory(paths[0])) return read.slices(slices_of(paths[0]), paths[0]);
+    return read_file(read, paths[0], layout);
 }
 
 }  // namespace
@@ -123,22 +196,7 @@ bool natural_less(const std::string& a, const std::string& b)
     return a.size() - i < b.size() - j;
 }
 
-VoxelStack read_stack(std::span<const std::string> paths, const std::optional<RawLayout>& layout)
-{
-    if (paths.empty()) throw UsageError("STACK", "no input is given");
-    if (paths.size() == 1) {
-        const auto at = paths[0].rfind(":/");
-        if (at != std::string::npos && !fs::exists(paths[0])) {
-            const fs::path file = paths[0].substr(0, at);
-            if (!fs::exists(file)) throw UsageError(file.string(), "no such file");
-            return detail::read_hdf5(file, paths[0].substr(at + 1));
-        }
-    }
-    for (const std::string& path : paths)
-        if (!fs::exists(path)) throw UsageError(path, "no such file or folder");
-    if (paths.size() > 1) return read_slices({paths.begin(), paths.end()}, fs::path(paths[0]).parent_path().string().empty() ? "slices" : fs::path(paths[0]).parent_path().string());
-    if (fs::is_directory(paths[0])) return read_slices(slices_of(paths[0]), paths[0]);
-    return read_file(paths[0], layout);
-}
+VoxelStack read_stack(std::span<const std::string> paths, const std::optional<RawLayout>& layout) { return read_any(voxel_readers, paths, layout); }
+StackHeader read_stack_header(std::span<const std::string> paths, const std::optional<RawLayout>& layout) { return read_any(header_readers, paths, layout); }
 
 }  // namespace coral::morph

@@ -25,6 +25,18 @@ struct RawLayout {
 /// \throws Error       unreadable, truncated or unsupported file (names file and page), missing slice, slices of different size
 VoxelStack read_stack(std::span<const std::string> paths, const std::optional<RawLayout>& layout = {});
 
+/// What a stack is, from its headers alone.
+struct StackHeader {
+    Eigen::Vector3i size = Eigen::Vector3i::Zero();        ///< voxels along x, y, z
+    Eigen::Vector3d voxel_size = Eigen::Vector3d::Zero();  ///< edges of a voxel [m]; zero when the file does not say
+    std::string type;                                      ///< of its numbers: u1, u8, i8, u16, i16, u32, i32, f32 or f64
+    std::string name;
+};
+
+/// Like read_stack, but no voxel is read: takes no memory and hardly time, however large the stack. What only the voxels show
+/// (damage within them, numbers out of range) goes unnoticed.
+StackHeader read_stack_header(std::span<const std::string> paths, const std::optional<RawLayout>& layout = {});
+
 /// Writes integer voxels as a deflate-compressed multi-page TIFF with ImageJ's calibration [um].
 /// \param bits  8, 16 or 32
 /// \throws Error when a value does not fit or the file cannot be written

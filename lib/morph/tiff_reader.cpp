@@ -56,24 +56,40 @@ public:
         handle_.reset(TIFFOpenExt(file_.c_str(), "rc", options));  // c: no chopping of strips into 8 kB pieces
         TIFFOpenOptionsFree(options);
         if (!handle_) throw Error(file_, "cannot be read as TIFF (" + complaint_.text + ")", damaged_hint);
+        file_bytes_ = double(std::filesystem::file_size(file));
     }
 
     VoxelStack run()
     {
+        walk(true);
+        sink_.finish(stack_);
+        return std::move(stack_);
+    }
+
+    StackHeader header()
+    {
+        walk(false);
+        return {stack_.size, stack_.voxel_size, to_string(number_type()), stack_.name};
+    }
+
+private:
+    /// All pages, with or without their voxels.
+    void walk(bool voxels)
+    {
         stack_.name = std::filesystem::path(file_).filename().string();
         first_ = page_fields();
         check_supported(first_);
-        sink_.reserve(std::size_t(first_.width) * first_.height, std::max(first_.bits / 8, 1));
+        if (voxels) sink_.reserve(std::size_t(first_.width) * first_.height, std::max(first_.bits / 8, 1));
         read_description();
         int pages = 0;
         const bool single = announced_pages_ > 1 && TIFFNumberOfDirectories(handle_.get()) == 1 && complaint_.text.empty();
         complaint_.text.clear();  // what the count met, the walk below meets again, and can name the page
         if (single) {
-            read_contiguous();
+            read_contiguous(voxels);
             pages = announced_pages_;
         } else {
             do {
-                read_page(++pages);
+                read_page(++pages, voxels);
             } while (TIFFReadDirectory(handle_.get()));
             fail_on_complaint(pages + 1);
             if (announced_pages_ > 0 && announced_pages_ != pages)
@@ -81,11 +97,8 @@ public:
                             damaged_hint);
         }
         stack_.size = {int(first_.width), int(first_.height), pages};
-        sink_.finish(stack_);
-        return std::move(stack_);
     }
 
-private:
     std::string where(int page) const { return file_ + ": page " + std::to_string(page); }
 
     void fail_on_complaint(int page) const
@@ -114,6 +127,12 @@ private:
         if (p.samples != 1) refuse("has " + std::to_string(p.samples) + " colours per pixel");
         if (p.photometric == PHOTOMETRIC_PALETTE) refuse("is a palette image");
         if (p.photometric == PHOTOMETRIC_MINISWHITE) refuse("counts white as zero");
+        // A page of a few bytes may claim any size. No codec of libtiff packs better than this, and small pages may be all one value.
+        constexpr double most_unpacked_per_packed = 1e4, always_allowed_bytes = 64 << 20;
+        const double page_bytes = double(p.width) * p.height * p.bits / 8;
+        const double most = p.compression == COMPRESSION_NONE ? file_bytes_ : std::max(always_allowed_bytes, most_unpacked_per_packed * file_bytes_);
+        if (page_bytes > most)
+            throw Error(where(1), "asks for " + std::to_string(std::uint64_t(page_bytes)) + " bytes, but the file has " + std::to_string(std::uint64_t(file_bytes_)), damaged_hint);
         const bool real = p.format == SAMPLEFORMAT_IEEEFP;
         const bool known = real ? p.bits == 32 || p.bits == 64 : p.bits == 1 || p.bits == 8 || p.bits == 16 || p.bits == 32;
         if (!known || p.format > SAMPLEFORMAT_VOID)
@@ -130,7 +149,7 @@ private:
         return type;
     }
 
-    void read_page(int number)
+    void read_page(int number, bool voxels)
     {
         fail_on_complaint(number);
         const Page p = page_fields();
@@ -139,6 +158,7 @@ private:
                         "is " + std::to_string(p.width) + " x " + std::to_string(p.height) + " at " + std::to_string(p.bits) + " bits where page 1 is " +
                             std::to_string(first_.width) + " x " + std::to_string(first_.height) + " at " + std::to_string(first_.bits),
                         "all pages must have one size and type");
+        if (!voxels) return;
         const std::size_t row_bytes = (std::size_t(p.width) * p.bits + 7) / 8;
         std::vector<std::byte> image(row_bytes * p.height);
         if (TIFFIsTiled(handle_.get())) read_tiles(image, row_bytes, p, number);
@@ -185,7 +205,7 @@ private:
     }
 
     /// ImageJ (over 4 GB) and tifffile write one page and all other slices as plain numbers behind it.
-    void read_contiguous()
+    void read_contiguous(bool voxels)
     {
         if (first_.compression != COMPRESSION_NONE || first_.bits < 8)
             throw Error(file_, "holds 1 page where its description announces " + std::to_string(announced_pages_), damaged_hint);
@@ -194,6 +214,10 @@ private:
         const std::size_t page_bytes = std::size_t(first_.width) * first_.height * first_.bits / 8;
         NumberType type = number_type();
         type.swapped = TIFFIsByteSwapped(handle_.get()) != 0;
+        if (const double end = double(offsets[0]) + double(page_bytes) * announced_pages_; end > file_bytes_)
+            throw Error(file_, "announces " + std::to_string(announced_pages_) + " pages, which end at byte " + std::to_string(std::uint64_t(end)) + ", but the file has " +
+                                   std::to_string(std::uint64_t(file_bytes_)), damaged_hint);
+        if (!voxels) return;
         std::ifstream in(file_, std::ios::binary);
         in.seekg(std::streamoff(offsets[0]));
         std::vector<std::byte> image(page_bytes);
@@ -214,7 +238,8 @@ private:
             const auto begin = description.find('[', shape) + 1;
             double product = 1;
             for (const std::string& n : split(description.substr(begin, description.find(']', begin) - begin), ',')) product *= std::atof(n.c_str());
-            announced_pages_ = int(product / (double(first_.width) * first_.height));
+            const double pages = product / (double(first_.width) * first_.height);
+            announced_pages_ = pages >= 1 && pages < 1e9 ? int(pages) : 0;
         }
         if (!description.starts_with("ImageJ=")) return;
         double spacing = 0, unit = 0;
@@ -244,10 +269,12 @@ private:
     VoxelStack stack_;
     Page first_;
     int announced_pages_ = 0;
+    double file_bytes_ = 0;
 };
 
 }  // namespace
 
 VoxelStack read_tiff(const std::filesystem::path& file) { return Reader(file).run(); }
+StackHeader tiff_header(const std::filesystem::path& file) { return Reader(file).header(); }
 
 }  // namespace coral::morph::detail

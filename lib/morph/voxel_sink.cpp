@@ -106,6 +106,12 @@ void VoxelSink::finish(VoxelStack& stack)
     stack.reals = std::move(reals_);
 }
 
+std::string to_string(const NumberType& type)
+{
+    const char* kind = type.kind == NumberKind::real ? "f" : type.kind == NumberKind::signed_integer ? "i" : "u";
+    return kind + std::to_string(type.bytes == 0 ? 1 : 8 * type.bytes);
+}
+
 double metres_per_unit(std::string unit)
 {
     while (!unit.empty() && (unit.back() == ' ' || unit.back() == '\r' || unit.back() == '"')) unit.pop_back();

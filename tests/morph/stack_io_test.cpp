@@ -194,6 +194,86 @@ TEST_F(StackIo, nrrd_raw_and_gzip_come_with_their_spacing)
     }
 }
 
+TEST_F(StackIo, a_header_that_asks_for_more_than_the_file_holds_takes_no_memory)
+{
+    const auto complaint = [&](const std::string& name, const std::string& text) {
+        std::ofstream(folder_ / name, std::ios::binary) << text;
+        return message_of(folder_ / name);
+    };
+    const auto nrrd = [](const std::string& sizes, const std::string& encoding, const std::string& data, const std::string& more = "") {
+        return "NRRD0004\ntype: uint16\ndimension: 3\nsizes: " + sizes + "\nencoding: " + encoding + "\nendian: little\n" + more + "\n" + data;
+    };
+    const std::string hint = "; compare size and type in the header; the file may be truncated: copy it again", hundred(100, 'x');
+    EXPECT_EQ(complaint("a.nrrd", nrrd("1000000 1000000 1000000", "raw", hundred)),
+              (folder_ / "a.nrrd").string() + ": asks for 2000000000000000000 bytes of voxels, but only 100 bytes follow" + hint);
+    EXPECT_EQ(complaint("b.nrrd", nrrd("50 1 2", "raw", hundred)), (folder_ / "b.nrrd").string() + ": asks for 200 bytes of voxels, but only 100 bytes follow" + hint);
+    EXPECT_EQ(complaint("c.nrrd", nrrd("1000 1000 1000", "gzip", hundred)),
+              (folder_ / "c.nrrd").string() + ": asks for 2000000000 bytes of voxels, which the 100 bytes of compressed data cannot hold" + hint);
+    EXPECT_NE(complaint("d.nrrd", nrrd("5 5 1", "raw", hundred)).find("asks for 50 bytes of voxels, but 100 bytes follow"), std::string::npos);
+    EXPECT_EQ(complaint("e.nrrd", nrrd("5 5 1", "raw", hundred, "byte skip: 50\n")), "read without an error");
+    EXPECT_EQ(complaint("f.nrrd", nrrd("5 5 1", "raw", hundred, "byte skip: -1\n")), "read without an error");
+    EXPECT_NE(complaint("g.nrrd", nrrd("5 nan 1", "raw", hundred)).find("'5 nan 1' where three numbers from 1 to 1000000"), std::string::npos);
+    EXPECT_NE(complaint("h.nrrd", nrrd("5 5 1", "raw", "", "data file: LIST\n")).find("several files"), std::string::npos);
+    const std::string meta = "NDims = 3\nElementType = MET_FLOAT\nDimSize = 900 900 900\nCompressedData = ";
+    EXPECT_EQ(complaint("a.mha", meta + "False\nElementDataFile = LOCAL\n" + hundred),
+              (folder_ / "a.mha").string() + ": asks for 2916000000 bytes of voxels, but only 100 bytes follow" + hint);
+    EXPECT_EQ(complaint("b.mha", meta + "True\nElementDataFile = LOCAL\n" + hundred),
+              (folder_ / "b.mha").string() + ": asks for 2916000000 bytes of voxels, which the 100 bytes of compressed data cannot hold" + hint);
+    EXPECT_EQ(complaint("c.mhd", meta + "False\nElementDataFile = gone.raw\n"),
+              (folder_ / "c.mhd").string() + ": names the data file 'gone.raw', which is not there; copy it beside the header, or correct the name");
+}
+
+TEST_F(StackIo, headers_say_the_same_as_the_voxels)
+{
+    VoxelStack stack = pattern(60000);
+    stack.voxel_size = {3e-5, 3e-5, 6e-5};
+    write_tiff(stack, folder_ / "stack.tif", 16);
+    fs::create_directory(folder_ / "slices");
+    write_tiff(pattern(200, 1), folder_ / "slices" / "s1.tif", 8);
+    write_tiff(pattern(200, 1), folder_ / "slices" / "s2.tif", 8);
+    const auto header = [&](const std::string& name) { return read_stack_header(std::vector{(folder_ / name).string()}); };
+    EXPECT_EQ(header("stack.tif").size, stack.size);
+    EXPECT_EQ(header("stack.tif").voxel_size, read(folder_ / "stack.tif").voxel_size);
+    EXPECT_EQ(header("stack.tif").type, "u16");
+    EXPECT_EQ(header("slices").size, Eigen::Vector3i(37, 23, 2));
+    EXPECT_EQ(header("slices").type, "u8");
+    fs::resize_file(folder_ / "stack.tif", fs::file_size(folder_ / "stack.tif") / 2);
+    EXPECT_THROW(header("stack.tif"), Error);
+}
+
+TEST_F(StackIo, a_folder_without_tiff_says_what_it_holds)
+{
+    std::ofstream(folder_ / "a_1.png") << "x";
+    std::ofstream(folder_ / "a_2.png") << "x";
+    std::ofstream(folder_ / "notes.txt") << "x";
+    EXPECT_EQ(message_of(folder_), folder_.string() + ": holds no .tif or .tiff slices but 2 .png, 1 .txt; export the slices as TIFF, or give the file of the stack itself");
+    const std::vector<std::string> files{(folder_ / "a_1.png").string(), (folder_ / "a_2.png").string()};
+    try {
+        read_stack(files);
+        FAIL() << "read";
+    } catch (const Error& error) {
+        EXPECT_NE(std::string(error.what()).find("a_1.png: is no .tif or .tiff, and of several files each must be one slice"), std::string::npos) << error.what();
+    }
+}
+
+// A page's size is believed only as far as the file goes: the tags alone used to reserve the memory.
+TEST_F(StackIo, a_tiff_page_far_larger_than_its_file_takes_no_memory)
+{
+    for (const int compression : {COMPRESSION_NONE, COMPRESSION_LZW}) {
+        TIFF* tiff = TIFFOpen((folder_ / "wide.tif").c_str(), "w");
+        for (const auto& [tag, value] : {std::pair{TIFFTAG_IMAGEWIDTH, 99999}, {TIFFTAG_IMAGELENGTH, 99999}, {TIFFTAG_BITSPERSAMPLE, 32}, {TIFFTAG_PHOTOMETRIC, int(PHOTOMETRIC_MINISBLACK)},
+                                         {TIFFTAG_COMPRESSION, compression}, {TIFFTAG_ROWSPERSTRIP, 99999}})
+            TIFFSetField(tiff, std::uint32_t(tag), value);
+        char few[] = "few bytes";
+        TIFFWriteRawStrip(tiff, 0, few, sizeof few);
+        TIFFWriteDirectory(tiff);
+        TIFFClose(tiff);
+        const std::string message = message_of(folder_ / "wide.tif");
+        EXPECT_NE(message.find("page 1: asks for 39999200004 bytes, but the file has"), std::string::npos) << message;
+        EXPECT_NE(message.find("truncated or damaged"), std::string::npos) << message;
+    }
+}
+
 TEST_F(StackIo, metaimage_and_raw_are_read)
 {
     const VoxelStack stack = pattern(256);

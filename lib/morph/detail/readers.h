@@ -47,6 +47,15 @@ private:
     bool real_ = false;
 };
 
+/// "u8", "i16", "f32" ...
+std::string to_string(const NumberType& type);
+
+StackHeader tiff_header(const std::filesystem::path& file);
+StackHeader nrrd_header(const std::filesystem::path& file);
+StackHeader metaimage_header(const std::filesystem::path& file);
+StackHeader raw_header(const std::filesystem::path& file, const RawLayout& layout);
+StackHeader hdf5_header(const std::filesystem::path& file, const std::string& dataset);
+
 VoxelStack read_tiff(const std::filesystem::path& file);
 VoxelStack read_nrrd(const std::filesystem::path& file);
 VoxelStack read_metaimage(const std::filesystem::path& file);
