@@ -5,21 +5,54 @@
 #include <cstdint>
 #include <iterator>
 #include <span>
-#include <variant>
+#include <utility>
 #include <vector>
 
 namespace coral::morph {
 
-/// Unsigned integers up to 2^32 - 1 in the narrowest of 1, 2 or 4 bytes that holds all of them so far. A number that does
-/// not fit widens the whole (for a moment both widths are in memory); reserve() with the width of the file avoids that.
+namespace detail {
+
+/// Bytes that grow and shrink in place: realloc moves the pages of a large block, where a vector would hold two copies.
+class ByteBlock {
+public:
+    ByteBlock() = default;
+    ByteBlock(const ByteBlock& other);
+    ByteBlock(ByteBlock&& other) noexcept { swap(other); }
+    ByteBlock& operator=(ByteBlock other) noexcept
+    {
+        swap(other);
+        return *this;
+    }
+    ~ByteBlock();
+    std::size_t size() const { return size_; }
+    const std::byte* data() const { return data_; }
+    std::byte* data() { return data_; }
+    void reserve(std::size_t bytes);
+    void resize(std::size_t bytes);  ///< new bytes are not set
+
+private:
+    void swap(ByteBlock& other) noexcept
+    {
+        std::swap(data_, other.data_);
+        std::swap(size_, other.size_);
+        std::swap(capacity_, other.capacity_);
+    }
+    std::byte* data_ = nullptr;
+    std::size_t size_ = 0, capacity_ = 0;
+};
+
+}  // namespace detail
+
+/// Unsigned integers up to 2^32 - 1 in the narrowest of 1, 2 or 4 bytes that holds all of them so far. A number that does not fit
+/// widens the whole in place; there is never a second copy.
 class VoxelValues {
 public:
     VoxelValues() = default;
     VoxelValues(std::size_t count, std::uint32_t value);
     VoxelValues(const std::vector<std::uint32_t>& values);
 
-    /// Room for `count` values of `bytes` bytes (1, 2 or 4) each.
-    void reserve(std::size_t count, int bytes);
+    /// Room for `count` values of `bytes` bytes (1, 2 or 4) each; memory is taken as they come.
+    void reserve(std::size_t count, int bytes) { block_.reserve(count * std::size_t(bytes)); }
     void append(std::span<const std::uint8_t> values);
     void append(std::span<const std::uint16_t> values);
     void append(std::span<const std::uint32_t> values);
@@ -28,15 +61,15 @@ public:
     /// From several threads at once only while every value fits the present width.
     void set(std::size_t at, std::uint32_t value);
 
-    std::size_t size() const;
+    std::size_t size() const { return block_.size() / std::size_t(bytes_); }
     bool empty() const { return size() == 0; }
-    int bytes() const;  ///< of one value
+    int bytes() const { return bytes_; }  ///< of one value
     std::uint32_t operator[](std::size_t at) const
     {
-        switch (values_.index()) {
-            case 0: return std::get<0>(values_)[at];
-            case 1: return std::get<1>(values_)[at];
-            default: return std::get<2>(values_)[at];
+        switch (bytes_) {
+            case 1: return as<std::uint8_t>()[at];
+            case 2: return as<std::uint16_t>()[at];
+            default: return as<std::uint32_t>()[at];
         }
     }
     /// Copies out.size() values from `first` on.
@@ -47,7 +80,11 @@ public:
     template <class Visitor>
     auto visit(Visitor&& visitor) const
     {
-        return std::visit([&](const auto& values) { return visitor(std::span(values)); }, values_);
+        switch (bytes_) {
+            case 1: return visitor(as<std::uint8_t>());
+            case 2: return visitor(as<std::uint16_t>());
+            default: return visitor(as<std::uint32_t>());
+        }
     }
 
     /// Reads one value after the other.
@@ -84,11 +121,17 @@ public:
     friend bool operator==(const VoxelValues& a, const VoxelValues& b);
 
 private:
+    template <class T>
+    std::span<const T> as() const
+    {
+        return {reinterpret_cast<const T*>(block_.data()), block_.size() / sizeof(T)};
+    }
     void widen(std::uint32_t largest);
     template <class T>
     void append_narrow(std::span<const T> values);
 
-    std::variant<std::vector<std::uint8_t>, std::vector<std::uint16_t>, std::vector<std::uint32_t>> values_;
+    detail::ByteBlock block_;
+    int bytes_ = 1;
 };
 
 }  // namespace coral::morph

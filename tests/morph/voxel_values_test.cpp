@@ -25,9 +25,8 @@ TEST(VoxelValues, keeps_numbers_in_the_narrowest_width_that_holds_them)
 
 TEST(VoxelValues, are_equal_whatever_their_widths)
 {
-    VoxelValues wide, narrow(3, 9);
-    wide.reserve(3, 4);
-    for (int i = 0; i < 3; ++i) wide.push_back(9);
+    VoxelValues wide(3, 70000), narrow(3, 9);
+    for (std::size_t i = 0; i < 3; ++i) wide.set(i, 9);
     EXPECT_EQ(wide.bytes(), 4);
     EXPECT_EQ(narrow.bytes(), 1);
     EXPECT_EQ(wide, narrow);
@@ -36,6 +35,24 @@ TEST(VoxelValues, are_equal_whatever_their_widths)
     EXPECT_EQ(narrow[1], 70000U);
     EXPECT_EQ(narrow[2], 9U);
     EXPECT_FALSE(wide == narrow);
+}
+
+TEST(VoxelValues, stay_narrow_in_room_for_wider_ones_and_widen_in_place)
+{
+    VoxelValues values;
+    values.reserve(100000, 4);
+    std::vector<std::uint32_t> truth;
+    for (std::uint32_t v = 0; v < 99998; ++v) truth.push_back(v * 7 % 251);
+    values.append(std::span<const std::uint32_t>(truth));
+    EXPECT_EQ(values.bytes(), 1);
+    for (const std::uint32_t larger : {40000U, 4000000000U}) {
+        const VoxelValues before = values;
+        values.push_back(larger);
+        truth.push_back(larger);
+        EXPECT_EQ(values, VoxelValues(truth));
+        EXPECT_EQ(before.size() + 1, values.size()) << "a copy is its own";
+    }
+    EXPECT_EQ(values.bytes(), 4);
 }
 
 TEST(VoxelValues, append_joins_different_widths)
