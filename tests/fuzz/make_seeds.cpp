@@ -1,4 +1,5 @@
 // Small good files for the fuzzers to start from, one folder per reader.
+#include <hdf5.h>
 #include <tiffio.h>
 
 #include <cmath>
@@ -77,8 +78,33 @@ void headers(const fs::path& nrrd, const fs::path& meta)
                                       std::string("\x78\x9c\x63\x60\xa0\x2d\0\0\0\x40\0\x01", 12));
 }
 
+/// A stack as other programs write it: the oldest layout has no checksums, so that the fuzzer gets further with it.
+void old_hdf5(const fs::path& file, bool packed)
+{
+    const hid_t id = H5Fcreate(file.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT), list = H5Pcreate(H5P_DATASET_CREATE);
+    const hsize_t dims[] = {4, 4, 4}, chunk[] = {2, 4, 4}, three = 3;
+    if (packed) {
+        H5Pset_chunk(list, 3, chunk);
+        H5Pset_shuffle(list);
+        H5Pset_deflate(list, 4);
+    }
+    const hid_t space = H5Screate_simple(3, dims, nullptr), dataset = H5Dcreate2(id, "labels", H5T_NATIVE_UINT16, space, H5P_DEFAULT, list, H5P_DEFAULT);
+    const std::vector<std::uint16_t> labels(64, 7);
+    H5Dwrite(dataset, H5T_NATIVE_UINT16, H5S_ALL, H5S_ALL, H5P_DEFAULT, labels.data());
+    const double edge[] = {3e-5, 3e-5, 3e-5};
+    const hid_t row = H5Screate_simple(1, &three, nullptr), attribute = H5Acreate2(dataset, "voxel_size", H5T_NATIVE_DOUBLE, row, H5P_DEFAULT, H5P_DEFAULT);
+    H5Awrite(attribute, H5T_NATIVE_DOUBLE, edge);
+    H5Aclose(attribute);
+    H5Dclose(dataset);
+    for (const hid_t s : {space, row}) H5Sclose(s);
+    H5Pclose(list);
+    H5Fclose(id);
+}
+
 void hdf5(const fs::path& folder)
 {
+    old_hdf5(folder / "old.h5", false);
+    old_hdf5(folder / "old_packed.h5", true);
     {
         H5File file = H5File::create(folder / "labels.h5");
         std::vector<std::int32_t> labels(64);
