@@ -74,7 +74,7 @@ TEST_F(VdbSeal, holds_for_a_whole_file_and_for_the_same_bytes_sealed_again)
 
 TEST_F(VdbSeal, breaks_with_any_single_byte)
 {
-    for (std::size_t at = 0; at < bytes.size(); at += at < 200 ? 1 : 37) {
+    for (std::size_t at = 0; at < bytes.size(); at += at < 80 ? 1 : 211) {
         if (at >= 12 && at < 20) continue;  // version of the OpenVDB that wrote it
         std::string changed = bytes;
         changed[at] = char(changed[at] ^ 0x10);
