@@ -1,7 +1,6 @@
 // CT stack (or meshes) to level sets: grains.vdb, grains.csv, voids and meshes.
 #include <spdlog/spdlog.h>
 
-#include <mutex>
 #include <numeric>
 
 #include "cli.h"
@@ -139,26 +138,25 @@ void run(const Options& o, const cli::Context& context)
     const Work work = prepare(o, options, stages);
     const std::vector<morph::Grain>& grains = work.extraction.grains;
     options.spacing = work.spacing;
+    RecordEntry entry = context.record;
+    entry.options["spacing"] = to_text(options.spacing);
+    writer.set_history({entry});
 
     std::vector<std::size_t> all(grains.size());
     std::iota(all.begin(), all.end(), std::size_t{0});
-    std::mutex lock;
     const std::vector<Converted> converted = convert_all(work.shapes(), all, options, "level sets", [&](std::size_t g, sdf::GrainLevelSet& grain) {
         grain.id = int(g) + 1;
         grain.label = grains[g].box.label;
         if (meshes.wanted()) meshes.write(sdf::extract_mesh(grain.solid), grain.id);
-        const std::lock_guard guard(lock);
         writer.add(grain);
     });
     warn_of_losses(grains, converted, options.spacing);
     stages.lap("level_sets");
 
-    RecordEntry entry = context.record;
-    entry.options["spacing"] = to_text(options.spacing);
     TextFile table(o.table), voids(o.voids);
     if (table.wanted()) table.write(grain_table(grains, converted).to_csv());
     if (voids.wanted()) voids.write(void_table(grains, converted).to_csv());
-    writer.commit({entry});
+    writer.commit();
     table.commit();
     voids.commit();
     meshes.commit();

@@ -7,14 +7,16 @@
 
 #include <array>
 #include <charconv>
-#include <fstream>
 #include <map>
+#include <mutex>
+#include <optional>
 #include <sstream>
 
 #include "core/error.h"
 #include "core/formats.h"
 #include "core/output_file.h"
 #include "core/text.h"
+#include "sdf/detail/grid_spill.h"
 #include "sdf/detail/vdb_seal.h"
 
 namespace coral::sdf {
@@ -90,18 +92,6 @@ void describe(FloatGrid& vdb, const GrainLevelSet& grain)
     vdb.insertMeta("centre", openvdb::Vec3DMetadata(openvdb::Vec3d(grain.centre.x(), grain.centre.y(), grain.centre.z())));
 }
 
-/// OpenVDB's File does not look at the stream after its last byte: a full disk would leave a cut file without a word.
-class CheckedArchive : public openvdb::io::Archive {
-public:
-    void write_file(const std::filesystem::path& file, const openvdb::GridCPtrVec& grids, const openvdb::MetaMap& metadata) const
-    {
-        std::ofstream stream(file, std::ios::binary);
-        stream.exceptions(std::ios::badbit | std::ios::failbit);  // with a word as to the place before more work is done
-        Archive::write(stream, grids, /*seekable=*/true, metadata);
-        stream.close();
-    }
-};
-
 /// A lattice holds more bytes than the tree it comes from, but a grain of 10,000 nodes across not a thousand times more.
 constexpr double most_lattice_per_stored = 4096, always_allowed_bytes = 64 << 20;
 
@@ -169,45 +159,71 @@ auto guarded(const std::filesystem::path& file, const Read& read)
 }  // namespace
 
 struct GrainWriter::Impl {
+    using Place = detail::GridSpill::Place;
     OutputFile output;
-    std::map<int, std::array<FloatGrid::Ptr, 2>> grids;
+    std::string history = to_json(History{});
+    std::mutex lock;  // of what follows
+    std::optional<detail::GridSpill> spill;
+    std::map<int, std::array<Place, 2>> grids;
+
+    explicit Impl(const std::filesystem::path& file) : output(file) {}
+    void open_spill() { spill.emplace(output.temporary().string() + ".grids"); }
+
+    /// Runs `write` and turns a failure of streams or of OpenVDB into an Error about the file.
+    template <class Write>
+    void guarded(const Write& write) const
+    {
+        constexpr const char* hint = "check the space left on the disk";
+        try {
+            write();
+        } catch (const Error&) {
+            throw;
+        } catch (const std::ios_base::failure&) {
+            throw Error(output.target().string(), "could not be written", hint);
+        } catch (const std::exception& problem) {
+            throw Error(output.target().string(), std::string("could not be written (") + problem.what() + ")", hint);
+        }
+    }
 };
 
-GrainWriter::GrainWriter(const std::filesystem::path& file) : impl_(new Impl{OutputFile(file), {}}) { openvdb::initialize(); }
+GrainWriter::GrainWriter(const std::filesystem::path& file) : impl_(new Impl(file)) { openvdb::initialize(); }
 GrainWriter::~GrainWriter() = default;
+
+void GrainWriter::set_history(const History& history) { impl_->history = to_json(history); }
 
 void GrainWriter::add(const GrainLevelSet& grain)
 {
-    if (grain.id < 1 || impl_->grids.count(grain.id)) throw Error(grid_name(grain.id, false), "ids must be positive and differ");
-    const std::array<FloatGrid::Ptr, 2> pair = {to_vdb(grain.solid, grain.solid.origin, grid_name(grain.id, false)),
-                                                to_vdb(grain.apparent, grain.solid.origin, grid_name(grain.id, true))};
-    for (const auto& vdb : pair) describe(*vdb, grain);
-    impl_->grids[grain.id] = pair;
+    const std::string name = grid_name(grain.id, false);
+    if (grain.id < 1) throw Error(name, "ids must be positive");
+    impl_->guarded([&] {
+        const auto stored = [&](const DistanceGrid& grid, bool apparent) {
+            const FloatGrid::Ptr vdb = to_vdb(grid, grain.solid.origin, grid_name(grain.id, apparent));
+            describe(*vdb, grain);
+            vdb->insertMeta("history", openvdb::StringMetadata(impl_->history));
+            return detail::store(vdb);
+        };
+        const detail::StoredGrid solid = stored(grain.solid, false), apparent = stored(grain.apparent, true);
+        const std::lock_guard guard(impl_->lock);
+        if (impl_->grids.count(grain.id)) throw Error(name, "ids must differ");
+        if (!impl_->spill) impl_->open_spill();
+        const Impl::Place first = impl_->spill->add(solid), second = impl_->spill->add(apparent);
+        impl_->grids[grain.id] = {first, second};
+    });
 }
 
-void GrainWriter::commit(const History& history)
+void GrainWriter::commit()
 {
-    const std::string target = impl_->output.target().string();
-    const openvdb::StringMetadata text(to_json(history));
-    openvdb::GridCPtrVec all;
-    for (const auto& [id, pair] : impl_->grids)
-        for (const auto& vdb : pair) {
-            vdb->insertMeta("history", text);
-            all.push_back(vdb);
-        }
     openvdb::MetaMap metadata;
-    metadata.insertMeta("history", text);
+    metadata.insertMeta("history", openvdb::StringMetadata(impl_->history));
     metadata.insertMeta("content", openvdb::StringMetadata("coralsand grains"));
     metadata.insertMeta("format_version", openvdb::Int32Metadata(std::int32_t(file_format::grains)));
-    const std::filesystem::path& file = impl_->output.temporary();
-    try {
-        CheckedArchive().write_file(file, all, metadata);
-    } catch (const std::ios_base::failure&) {
-        throw Error(target, "could not be written", "check the space left on the disk");
-    } catch (const std::exception& problem) {
-        throw Error(target, std::string("could not be written (") + problem.what() + ")", "check the space left on the disk");
-    }
-    detail::seal(file);
+    std::vector<Impl::Place> all;
+    for (const auto& [id, pair] : impl_->grids) all.insert(all.end(), pair.begin(), pair.end());
+    impl_->guarded([&] {
+        if (!impl_->spill) impl_->open_spill();
+        impl_->spill->join(impl_->output.temporary(), all, metadata);
+    });
+    detail::seal(impl_->output.temporary());
     impl_->output.commit();
 }
 
@@ -275,8 +291,9 @@ GrainLevelSet GrainReader::read(int id) const
 void write_grains(const std::filesystem::path& file, std::span<const GrainLevelSet> grains, const History& history)
 {
     GrainWriter writer(file);
+    writer.set_history(history);
     for (const GrainLevelSet& grain : grains) writer.add(grain);
-    writer.commit(history);
+    writer.commit();
 }
 
 GrainFile read_grains(const std::filesystem::path& file)

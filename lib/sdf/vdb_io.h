@@ -13,17 +13,19 @@
 
 namespace coral::sdf {
 
-/// Collects grains in compact form and writes them at once. The same grains give the same bytes.
+/// Takes grains one by one and makes the file at the end. Meanwhile the compressed grids lie in a nameless file beside the target (as
+/// large as it), not in memory. The same grains give the same bytes in whatever order they come.
 class GrainWriter {
 public:
     /// \throws Error when the folder is missing or not writable
     explicit GrainWriter(const std::filesystem::path& file);
     ~GrainWriter();
-    /// Keeps a compact copy; grains may come in any order and are written by rising id. Not thread-safe.
-    /// \throws Error when the id was given before
+    /// The whole chain, this tool's entry last. Every grid carries it: call this before the first add().
+    void set_history(const History& history);
+    /// In any order, from several threads at once. \throws Error when the id was given before, or on a full disk
     void add(const GrainLevelSet& grain);
-    /// Writes the file. \param history  the whole chain, this tool's entry last
-    void commit(const History& history);
+    /// Writes the file, grains by rising id. \throws Error on a full disk
+    void commit();
 
 private:
     struct Impl;

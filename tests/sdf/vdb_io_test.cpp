@@ -1,9 +1,15 @@
 #include "sdf/vdb_io.h"
 
 #include <gtest/gtest.h>
+#include <openvdb/io/File.h>
+#include <openvdb/openvdb.h>
+#include <sys/resource.h>
+#include <unistd.h>
 
+#include <csignal>
 #include <filesystem>
 #include <fstream>
+#include <thread>
 
 #include "core/error.h"
 #include "core/output_file.h"
@@ -116,11 +122,105 @@ TEST_F(VdbFile, that_is_absent_foreign_or_cut_short_is_an_error)
     }
 }
 
+TEST_F(VdbFile, has_the_same_bytes_whatever_the_order_and_the_threads)
+{
+    std::vector<GrainLevelSet> grains;
+    for (int id = 1; id <= 6; ++id) grains.push_back(hollow_ball(id, 8 + id));
+    write_grains(folder / "a.vdb", grains, chain);
+    GrainWriter writer(folder / "b.vdb");
+    writer.set_history(chain);
+    std::vector<std::thread> threads;
+    for (int t = 0; t < 3; ++t)
+        threads.emplace_back([&, t] {
+            for (const int n : {5 - t, t}) writer.add(grains[std::size_t(n)]);
+        });
+    for (std::thread& thread : threads) thread.join();
+    writer.commit();
+    EXPECT_EQ(read_text_file(folder / "a.vdb"), read_text_file(folder / "b.vdb"));
+}
+
+// The grids are written one by one and joined; what OpenVDB itself would write of them must come out.
+TEST_F(VdbFile, is_a_file_of_openvdb_grid_by_grid)
+{
+    const std::vector<GrainLevelSet> grains = {hollow_ball(3, 20), hollow_ball(1, 12), hollow_ball(10, 9)};
+    write_grains(folder / "grains.vdb", grains, chain);
+    openvdb::io::File file((folder / "grains.vdb").string());
+    file.open();
+    EXPECT_EQ(file.getMetadata()->metaValue<std::string>("history"), to_json(chain));
+    const auto all = file.getGrids();
+    ASSERT_EQ(all->size(), 6U);
+    for (const GrainLevelSet& grain : grains)
+        for (const bool apparent : {false, true}) {
+            const std::string name = "grain_" + std::to_string(grain.id) + (apparent ? "_apparent" : "");
+            const auto grid = openvdb::gridPtrCast<openvdb::FloatGrid>(file.readGrid(name));
+            ASSERT_TRUE(grid) << name;
+            EXPECT_EQ(grid->getName(), name);
+            EXPECT_EQ(grid->getGridClass(), openvdb::GRID_LEVEL_SET);
+            EXPECT_EQ(grid->metaValue<std::string>("history"), to_json(chain));
+            EXPECT_EQ(grid->metaValue<std::int64_t>("label"), std::int64_t(grain.label));
+            EXPECT_EQ(grid->activeVoxelCount(), std::uint64_t(grid->metaValue<std::int64_t>("file_voxel_count")));
+            const DistanceGrid& dense = apparent ? grain.apparent : grain.solid;
+            auto values = grid->getConstAccessor();
+            const openvdb::Vec3i first = grid->metaValue<openvdb::Vec3i>("lattice_first");
+            for (std::size_t n = 0; n < dense.distance.size(); n += 7) {
+                const int nx = dense.size.x(), ny = dense.size.y(), i = int(n) % nx, j = int(n) / nx % ny, k = int(n) / nx / ny;
+                ASSERT_NEAR(values.getValue(openvdb::Coord(first[0] + i, first[1] + j, first[2] + k)), 1e3 * double(dense.distance[n]), 1e-6);
+            }
+        }
+}
+
+/// Resident memory of this process now [bytes].
+double resident()
+{
+    std::ifstream statm("/proc/self/statm");
+    double all = 0, pages = 0;
+    statm >> all >> pages;
+    return pages * double(sysconf(_SC_PAGESIZE));
+}
+
+TEST_F(VdbFile, does_not_grow_in_memory)
+{
+#if defined(__SANITIZE_ADDRESS__)
+    GTEST_SKIP() << "freed memory is kept";
+#endif
+    GrainLevelSet grain = hollow_ball(1, 50);
+    GrainWriter writer(folder / "grains.vdb");
+    for (; grain.id <= 20; ++grain.id) writer.add(grain);  // the allocator has its fill
+    const double before = resident();
+    for (; grain.id <= 120; ++grain.id) writer.add(grain);
+    const double growth = resident() - before;
+    writer.commit();
+    const double written = double(fs::file_size(folder / "grains.vdb")) * 100 / 120;
+    EXPECT_GT(written, 25e6) << "too little to tell";
+    EXPECT_LT(growth, 0.3 * written);
+}
+
+TEST_F(VdbFile, leaves_nothing_behind_on_a_full_disk)
+{
+    rlimit before{};
+    getrlimit(RLIMIT_FSIZE, &before);
+    const auto handler = std::signal(SIGXFSZ, SIG_IGN);
+    const GrainLevelSet grain = hollow_ball(1, 20);
+    const rlimit full{20000, before.rlim_max};
+    setrlimit(RLIMIT_FSIZE, &full);
+    std::string complaint;
+    try {
+        write_grains(folder / "grains.vdb", {&grain, 1}, chain);
+    } catch (const Error& error) {
+        complaint = error.what();
+    }
+    setrlimit(RLIMIT_FSIZE, &before);
+    std::signal(SIGXFSZ, handler);
+    EXPECT_NE(complaint.find("grains.vdb: could not be written; check the space left on the disk"), std::string::npos) << complaint;
+    EXPECT_TRUE(fs::is_empty(folder));
+}
+
 TEST_F(VdbFile, leaves_nothing_behind_when_not_committed)
 {
     {
         GrainWriter writer(folder / "grains.vdb");
         writer.add(hollow_ball(1, 12));
+        EXPECT_TRUE(fs::is_empty(folder)) << "nothing has a name yet, so that nothing is left if the program is killed";
         EXPECT_THROW(writer.add(hollow_ball(1, 12)), Error) << "same id twice";
     }
     EXPECT_TRUE(fs::is_empty(folder));
