@@ -1,6 +1,8 @@
 // CT stack (or meshes) to level sets: grains.vdb, grains.csv, voids and meshes.
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
+#include <limits>
 #include <numeric>
 
 #include "cli.h"
@@ -99,7 +101,12 @@ struct Work {
     morph::Extraction extraction;
     std::vector<sdf::TriangleMesh> surfaces;
     double spacing = 0;
-    Shapes shapes() const { return {extraction.grains, surfaces}; }
+    /// The stack is gone by now. Meshes have none to hold the memory against: they take what they need.
+    Shapes shapes() const
+    {
+        const double voxels = source.size.cast<double>().prod();
+        return {extraction.grains, surfaces, voxels > 0 ? std::max(1.5 * voxels, 256.0 * 1024 * 1024) : std::numeric_limits<double>::infinity()};
+    }
 };
 
 Work prepare(const Options& o, const sdf::LevelSetOptions& options, Stages& stages)

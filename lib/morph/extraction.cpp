@@ -1,8 +1,5 @@
 #include "morph/extraction.h"
 
-#include <oneapi/tbb/parallel_for.h>
-#include <oneapi/tbb/task_arena.h>
-
 #include <algorithm>
 #include <cmath>
 #include <mutex>
@@ -10,6 +7,7 @@
 #include <optional>
 
 #include "core/error.h"
+#include "core/parallel_within.h"
 
 namespace coral::morph {
 namespace {
@@ -86,21 +84,18 @@ Extraction extract_grains(const VoxelValues& labels, const Eigen::Vector3i& size
                           const ExtractionOptions& options, const std::function<void(double)>& done)
 {
     const std::vector<LabelBox> boxes = label_boxes(labels, size);
-    // The largest first: the last grains to finish are then small ones.
-    std::vector<std::size_t> order(boxes.size());
-    for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
-    std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return boxes[a].voxels > boxes[b].voxels; });
+    std::vector<double> bytes;
+    for (const LabelBox& box : boxes) bytes.push_back(working_bytes_per_voxel * (box.high - box.low).cast<double>().prod());
+    const double budget = std::max(0.7 * double(labels.size()), 256.0 * 1024 * 1024);
 
     std::vector<Outcome> outcomes(boxes.size());
     std::mutex report;
     double finished = 0;
-    tbb::parallel_for(std::size_t{0}, order.size(), [&](std::size_t i) {
-        const LabelBox& box = boxes[order[i]];
-        // Isolated: a thread that waits for the inner loops must not start another grain and its memory.
-        tbb::this_task_arena::isolate([&] { outcomes[order[i]] = measure_label(labels, size, voxel_size, box, options); });
+    parallel_within(budget, bytes, [&](std::size_t i) {
+        outcomes[i] = measure_label(labels, size, voxel_size, boxes[i], options);
         if (!done) return;
         const std::lock_guard lock(report);
-        done(finished += double(box.voxels));
+        done(finished += double(boxes[i].voxels));
     });
 
     Extraction out;

@@ -45,7 +45,12 @@ struct Extraction {
     std::vector<Dropped> dropped;  ///< by rising label: nothing vanishes silently
 };
 
-/// Measures all grains, several at a time. The result does not depend on the number of threads.
+/// Memory that work on one grain takes per voxel of its box: some 55 bytes while it is measured, as many while it is converted at two
+/// voxels to a node.
+inline constexpr double working_bytes_per_voxel = 64;
+
+/// Measures all grains, as many at a time as fit into 0.7 bytes per voxel of the stack (or 256 MiB, if that is more).
+/// The result does not depend on the number of threads.
 /// \param done  called after each grain with the voxels finished so far (from any thread, one at a time); may be empty
 Extraction extract_grains(const VoxelValues& labels, const Eigen::Vector3i& size, const Eigen::Vector3d& voxel_size,
                           const ExtractionOptions& options, const std::function<void(double)>& done = {});

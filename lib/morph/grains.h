@@ -31,6 +31,7 @@ public:
     PackedMask() = default;
     explicit PackedMask(const Mask& mask);
     Mask unpack() const;
+    std::size_t count() const { return frame_.count(); }  ///< voxels of the box
 
 private:
     Mask frame_;  ///< without voxels

@@ -1,12 +1,11 @@
 #include "csct2ls/convert.h"
 
-#include <oneapi/tbb/parallel_for.h>
-#include <oneapi/tbb/task_arena.h>
-
 #include <mutex>
+#include <numeric>
 #include <optional>
 
 #include "core/error.h"
+#include "core/parallel_within.h"
 #include "core/progress.h"
 #include "sdf/mesh_level_set.h"
 
@@ -36,22 +35,22 @@ std::vector<Converted> convert_all(const Shapes& shapes, const std::vector<std::
                                    const std::string& what, const std::function<void(std::size_t, sdf::GrainLevelSet&)>& take)
 {
     std::vector<Converted> converted(which.size());
+    std::vector<double> bytes;
+    for (const std::size_t g : which) bytes.push_back(morph::working_bytes_per_voxel * double(shapes.grains[g].solid.count()));
     std::mutex lock;
     std::optional<Progress> progress;
-    if (!what.empty()) progress.emplace(what, double(which.size()));
-    std::size_t done = 0;
-    tbb::parallel_for(std::size_t{0}, which.size(), [&](std::size_t n) {
-        tbb::this_task_arena::isolate([&] {
-            try {
-                sdf::GrainLevelSet level_set = convert(shapes, which[n], options, converted[n]);
-                if (take) take(which[n], level_set);
-            } catch (const Error& error) {
-                throw Error("grain " + std::to_string(which[n] + 1) + " (label " + std::to_string(shapes.grains[which[n]].box.label) + ")", error.what());
-            }
-        });
+    if (!what.empty()) progress.emplace(what, std::accumulate(bytes.begin(), bytes.end(), 0.0));
+    double done = 0;
+    parallel_within(shapes.budget, bytes, [&](std::size_t n) {
+        try {
+            sdf::GrainLevelSet level_set = convert(shapes, which[n], options, converted[n]);
+            if (take) take(which[n], level_set);
+        } catch (const Error& error) {
+            throw Error("grain " + std::to_string(which[n] + 1) + " (label " + std::to_string(shapes.grains[which[n]].box.label) + ")", error.what());
+        }
         const std::lock_guard guard(lock);
-        ++done;
-        if (progress) progress->update(double(done));
+        done += bytes[n];
+        if (progress) progress->update(done);
     });
     if (progress) progress->finish();
     return converted;

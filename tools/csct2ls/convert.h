@@ -26,12 +26,13 @@ struct Converted {
 struct Shapes {
     std::span<const morph::Grain> grains;
     std::span<const sdf::TriangleMesh> surfaces;  ///< of the grains, when they came as meshes; else empty
+    double budget = 0;                            ///< memory to work in [bytes]; one grain at a time may need more
 };
 
 /// Level sets of grain number g. \param converted  filled in
 sdf::GrainLevelSet convert(const Shapes& shapes, std::size_t g, const sdf::LevelSetOptions& options, Converted& converted);
 
-/// Several grains at a time.
+/// Several grains at a time, the largest first.
 /// \param which  numbers of the grains
 /// \param take   gets each grain's number and level sets, from any thread, several at once; may be empty
 /// \param what   for the progress bar; empty for none
