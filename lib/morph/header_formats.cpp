@@ -166,9 +166,16 @@ Eigen::Vector3i size_from(const std::string& text, const std::string& where)
     return {int(n[0]), int(n[1]), int(n[2])};
 }
 
+/// False for a name that cannot be one too, such as one of thousands of letters out of a damaged header.
+bool is_file(const std::filesystem::path& file)
+{
+    std::error_code impossible;
+    return std::filesystem::is_regular_file(file, impossible);
+}
+
 std::ifstream open_binary(const std::filesystem::path& file)
 {
-    if (!std::filesystem::is_regular_file(file)) throw Error(file.string(), "is no file", "check the path");
+    if (!is_file(file)) throw Error(file.string(), "is no file", "check the path");
     std::ifstream in(file, std::ios::binary);
     if (!in) throw Error(file.string(), "cannot be opened", "check that you may read it");
     return in;
@@ -180,8 +187,8 @@ std::ifstream open_data(const std::filesystem::path& header, const std::string& 
     const std::filesystem::path file = header.parent_path() / name;
     if (name.starts_with("LIST") || name.find('%') != std::string::npos)
         throw Error(header.string(), "spreads its voxels over several files ('" + name + "')", "export it as one file, or as a folder of TIFF slices");
-    if (!std::filesystem::is_regular_file(file))
-        throw Error(header.string(), "names the data file '" + name + "', which is not there", "copy it beside the header, or correct the name");
+    if (!is_file(file))
+        throw Error(header.string(), "names the data file '" + name.substr(0, 200) + "', which is not there", "copy it beside the header, or correct the name");
     return open_binary(file);
 }
 
