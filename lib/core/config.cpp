@@ -197,6 +197,40 @@ Eigen::Vector3d ConfigTable::vector(std::string_view key, Dimension dimension, s
     return otherwise;
 }
 
+std::vector<Eigen::Vector3d> ConfigTable::vectors(std::string_view key, Dimension dimension) const
+{
+    std::vector<Eigen::Vector3d> values;
+    const auto* node = node_->find(key);
+    if (!node) {
+        node_->missing(key);
+        return values;
+    }
+    const toml::array* rows = node->as_array();
+    if (!rows) {
+        node_->problem(key, "is wrong: expected an array of [x, y, z]", "");
+        return values;
+    }
+    for (const toml::node& item : *rows) {
+        const toml::array* row = item.as_array();
+        if (!row || row->size() != 3) {
+            node_->problem(key, "is wrong at entry " + std::to_string(values.size() + 1) + ": expected [x, y, z]", "");
+            return {};
+        }
+        Eigen::Vector3d v;
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+            std::string problem;
+            const auto value = quantity_of(*row->get(axis), dimension, problem);
+            if (!value) {
+                node_->problem(key, "is wrong at entry " + std::to_string(values.size() + 1) + ": " + problem, "");
+                return {};
+            }
+            v[Eigen::Index(axis)] = *value;
+        }
+        values.push_back(v);
+    }
+    return values;
+}
+
 std::vector<std::string> ConfigTable::strings(std::string_view key, std::optional<std::vector<std::string>> fallback) const
 {
     const auto* node = node_->find(key);

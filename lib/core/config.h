@@ -29,6 +29,8 @@ public:
     /// A string out of a fixed set; another value is an error that lists the set.
     std::string choice(std::string_view key, std::span<const std::string> allowed, std::optional<std::string> fallback = {}) const;
     Eigen::Vector3d vector(std::string_view key, Dimension dimension, std::optional<Eigen::Vector3d> fallback = {}) const;
+    /// Array of [x, y, z].
+    std::vector<Eigen::Vector3d> vectors(std::string_view key, Dimension dimension) const;
     std::vector<double> quantities(std::string_view key, Dimension dimension, std::optional<std::vector<double>> fallback = {}) const;
     std::vector<std::string> strings(std::string_view key, std::optional<std::vector<std::string>> fallback = {}) const;
     std::vector<std::int64_t> integers(std::string_view key, std::optional<std::vector<std::int64_t>> fallback = {}) const;
