@@ -12,18 +12,18 @@ constexpr double sigmoid = 100.0;  ///< c of the potential [docs/numerics.md, co
 
 /// What the nodes of one pair are tested against.
 struct Field {
-    const sdf::DistanceGrid* grid = nullptr;
+    detail::DistanceField body;
     const WallData* wall = nullptr;
-    Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  ///< grid to world
-    Vec3 centre = Vec3::Zero();  ///< of the grid, nearest image to the slave
+    Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  ///< body to world
+    Vec3 centre = Vec3::Zero();  ///< of the body, nearest image to the slave
     double scale = 1.0;
 
     /// Distance [m] and world gradient at a world point.
     double operator()(const Vec3& p, Vec3& gradient) const
     {
-        if (grid) {
+        if (!wall) {
             Vec3 local;
-            const double d = scale * grid->sample_with_gradient(rotation.transpose() * (p - centre) / scale, local);
+            const double d = scale * body.depth_and_gradient(rotation.transpose() * (p - centre) / scale, local);
             gradient = rotation * local;
             return d;
         }
@@ -59,7 +59,7 @@ void World::Impl::node_loop(double dt)
             if (master >= 0) {
                 const std::size_t b = std::size_t(master);
                 to_b = periodic(x[a] - x[b]);
-                field.grid = &shapes[std::size_t(shape[b])]->distance_grid();
+                field.body = detail::DistanceField(*shapes[std::size_t(shape[b])]);
                 field.rotation = q[b].toRotationMatrix();
                 field.centre = x[a] - to_b;
                 field.scale = scale[b];

@@ -187,10 +187,10 @@ void World::Impl::sphere_grid_loop(double dt)
         for (std::size_t k = first; k < last; ++k) {
             const std::size_t i = std::size_t(l.sphere[k]), j = std::size_t(l.grid[k]);
             const Vec3 offset = periodic(x[i] - x[j]);
-            const sdf::DistanceGrid& field = shapes[std::size_t(shape[j])]->distance_grid();
+            const detail::DistanceField field(*shapes[std::size_t(shape[j])]);
             Vec3 local_gradient;
             const Vec3 local = q[j].conjugate() * offset;
-            const double overlap = radius[i] - scale[j] * field.sample_with_gradient(local / scale[j], local_gradient);
+            const double overlap = radius[i] - scale[j] * field.distance_and_gradient(local / scale[j], local_gradient);
             const bool touching = overlap > 0.0;
             if (!touching && l.touch[k] == 0) continue;
             const PairLaw& pair = law(material[i], material[j]);
@@ -204,7 +204,7 @@ void World::Impl::sphere_grid_loop(double dt)
             if (touching != (l.touch[k] != 0) && dt > 0.0 && l.touch[k] != 2) {
                 // Where the centre was against the grid a step ago: the rigid motion of the pair taken back.
                 const Vec3 before = q[j].conjugate() * Vec3(offset - relative * dt);
-                const double past = radius[i] - scale[j] * field.sample(before / scale[j]);
+                const double past = radius[i] - scale[j] * field.distance(before / scale[j]);
                 add_crossing(crossing, Index(i), Index(j), pair, past, overlap, approach, root_mass, dt, n, offset, s);
             }
             if (!touching) {

@@ -88,7 +88,7 @@ inline void World::Impl::kick_body(std::size_t i, double dt, const Vec3& g_dt)
         v[i] += (inverse_mass[i] * dt) * force[i] + g_dt;
     Vec3 impulse = dt * torque[i];
     if (any_external) impulse += dt * external_torque[i];
-    if (is_grid[i]) {
+    if (has_nodes[i]) {
         momentum[i] += impulse;
         update_spin(i);
     } else {
@@ -138,7 +138,7 @@ bool World::Impl::kick_and_drift(double dt)
         }
         const double moved2 = (x[i] - x_reference[i]).squaredNorm();
         expired = expired || moved2 > limit2;
-        if (!is_grid[i]) {
+        if (!has_nodes[i]) {
             turn_sphere(q[i], dt * w[i]);
             continue;
         }
@@ -203,7 +203,7 @@ void World::Impl::correct_crossings()
                 const std::size_t b = std::size_t(c.b);
                 relative -= v[b] + w[b].cross(c.arm_b);
                 inverse += inverse_mass[b];
-                if (is_grid[b] && motion[b] == Motion::free) {
+                if (has_nodes[b] && motion[b] == Motion::free) {
                     const Vec3 lever = c.arm_b.cross(c.normal);
                     inverse += lever.dot(apply_inverse_inertia(b, lever));
                 }
@@ -216,7 +216,7 @@ void World::Impl::correct_crossings()
             if (c.b < 0) continue;
             const std::size_t b = std::size_t(c.b);
             v[b] -= inverse_mass[b] * impulse;
-            if (is_grid[b] && motion[b] == Motion::free) {
+            if (has_nodes[b] && motion[b] == Motion::free) {
                 momentum[b] -= c.arm_b.cross(impulse);
                 update_spin(b);
             }
@@ -288,7 +288,7 @@ int World::relax(double overlap, int max_iterations)
             Vec3 way = rate / stiffness * m.force[i];
             if (way.norm() > longest * r) way *= longest * r / way.norm();
             m.x[i] += way;
-            if (!m.is_grid[i]) continue;
+            if (!m.has_nodes[i]) continue;
             Vec3 turn = rate / (stiffness * r * r) * m.torque[i];
             if (turn.norm() > longest) turn *= longest / turn.norm();
             if (turn.norm() > 0.0) m.q[i] = (Quat(Eigen::AngleAxisd(turn.norm(), turn.normalized())) * m.q[i]).normalized();

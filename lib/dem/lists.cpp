@@ -24,7 +24,7 @@ void make_sphere_list(World::Impl& world, const std::vector<BroadPair>& pairs)
         const std::size_t begin = l.other.size();
         std::size_t end = p;
         for (; end < pairs.size() && pairs[end].a == a; ++end)
-            if (!world.is_grid[std::size_t(a)] && !world.is_grid[std::size_t(pairs[end].b)]) l.other.push_back(pairs[end].b);
+            if (!world.has_nodes[std::size_t(a)] && !world.has_nodes[std::size_t(pairs[end].b)]) l.other.push_back(pairs[end].b);
         p = end;
         if (l.other.size() == begin) continue;
         l.rows.push_back(a);
@@ -52,7 +52,7 @@ void make_sphere_wall_list(World::Impl& world, double skin)
     l = {};
     std::size_t k = 0;
     for (std::size_t i = 0; i < world.x.size(); ++i) {
-        if (world.is_grid[i] || !world.free(i)) continue;
+        if (world.has_nodes[i] || !world.free(i)) continue;
         for (std::size_t wall = 0; wall < world.walls.size(); ++wall) {
             const WallData& data = world.walls[wall];
             Vec3 gradient;
@@ -85,7 +85,7 @@ void make_sphere_grid_list(World::Impl& world, const std::vector<BroadPair>& pai
     l = {};
     std::vector<BroadPair> mixed;  // a: sphere, b: grid
     for (const BroadPair& pair : pairs) {
-        const bool a = world.is_grid[std::size_t(pair.a)], b = world.is_grid[std::size_t(pair.b)];
+        const bool a = world.has_nodes[std::size_t(pair.a)], b = world.has_nodes[std::size_t(pair.b)];
         if (a != b) mixed.push_back(a ? BroadPair{pair.b, pair.a} : pair);
     }
     std::sort(mixed.begin(), mixed.end(), [](const BroadPair& s, const BroadPair& t) { return key_of(s.a, s.b) < key_of(t.a, t.b); });
@@ -95,11 +95,11 @@ void make_sphere_grid_list(World::Impl& world, const std::vector<BroadPair>& pai
         const Shape& shape = *world.shapes[std::size_t(world.shape[j])];
         const Vec3 local = world.q[j].conjugate() * world.periodic(world.x[i] - world.x[j]);
         const double scale = world.scale[j], within = world.radius[i] + skin;
-        const sdf::DistanceGrid& field = shape.distance_grid();
-        const double distance = scale * field.sample(local / scale);
+        const detail::DistanceField field(shape);
+        const double distance = scale * field.distance(local / scale);
         if (distance >= within) continue;
         // In a void the table answers for any radius; beyond its box, or where it is clamped, only out to its reach.
-        if (scale * shape.exterior_reach() < world.radius[i] && (!field.inside_box(local / scale) || distance >= scale * field.outside_limit))
+        if (scale * shape.exterior_reach() < world.radius[i] && (!field.grid->inside_box(local / scale) || distance >= scale * field.grid->outside_limit))
             throw Error(world.name(i) + " at " + world.name(j),
                         "radius " + to_text(world.radius[i]) + " m is larger than the exterior distances of " + shape.name() + " reach (" +
                             to_text(scale * shape.exterior_reach()) + " m)",
@@ -144,8 +144,8 @@ void append_pair(const World::Impl& world, const NodeList& old, NodeList& l, Ind
         const Vec3 to_b = world.periodic(world.x[a] - world.x[b]);
         const double scale = world.scale[b];
         const Eigen::Matrix3d to_local = world.q[b].toRotationMatrix().transpose() / scale;
-        const sdf::DistanceGrid& field = world.shapes[std::size_t(world.shape[b])]->distance_grid();
-        append_nodes(world, slave, skin, [&](const Vec3& arm) { return scale * field.sample(to_local * (to_b + arm)); }, l.node);
+        const detail::DistanceField field(*world.shapes[std::size_t(world.shape[b])]);
+        append_nodes(world, slave, skin, [&](const Vec3& arm) { return scale * field.lower_bound(to_local * (to_b + arm)); }, l.node);
     } else {
         const WallData& wall = world.walls[std::size_t(-1 - master)];
         if (wall.kind == WallData::Kind::plane) {
@@ -193,7 +193,7 @@ void make_node_list(World::Impl& world, const std::vector<BroadPair>& pairs, dou
     std::vector<Directed> directed;
     for (const BroadPair& pair : pairs) {
         const std::size_t a = std::size_t(pair.a), b = std::size_t(pair.b);
-        if (!world.is_grid[a] || !world.is_grid[b]) continue;
+        if (!world.has_nodes[a] || !world.has_nodes[b]) continue;
         // Nodes of the body of smaller outer volume; ties go to the lower id.
         const bool first = world.equivalent[a] <= world.equivalent[b];
         const double share = world.options.two_way_nodes ? 0.5 : 1.0;
@@ -201,7 +201,7 @@ void make_node_list(World::Impl& world, const std::vector<BroadPair>& pairs, dou
         if (!first || world.options.two_way_nodes) directed.push_back({pair.b, pair.a, share});
     }
     for (std::size_t i = 0; i < world.x.size(); ++i)
-        if (world.is_grid[i] && world.free(i))
+        if (world.has_nodes[i] && world.free(i))
             for (std::size_t wall = 0; wall < world.walls.size(); ++wall) directed.push_back({Index(i), -1 - Index(wall), 1.0});
     std::sort(directed.begin(), directed.end(),
               [](const Directed& s, const Directed& t) { return key_of(s.slave, s.master) < key_of(t.slave, t.master); });
@@ -260,7 +260,7 @@ bool World::Impl::lists_expired() const
     for (std::size_t i = 0; i < x.size(); ++i) {
         const double moved2 = (x[i] - x_reference[i]).squaredNorm();
         if (moved2 > limit * limit) return true;
-        if (!is_grid[i]) continue;
+        if (!has_nodes[i]) continue;
         // |q - q'| is half the angle for small turns; either sign of q is the same turn.
         const double turn = 2.0 * std::min((q[i].coeffs() - q_reference[i].coeffs()).norm(), (q[i].coeffs() + q_reference[i].coeffs()).norm());
         if (std::sqrt(moved2) + turn * radius[i] > limit) return true;

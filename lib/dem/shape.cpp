@@ -66,40 +66,86 @@ std::shared_ptr<const Shape> Shape::grid(GridShapeData data)
     if (!data.distance || data.distance->size.minCoeff() < 2 || data.distance->distance.size() != data.distance->node_count() ||
         !(data.distance->spacing > 0.0))
         throw Error(where, "the distance lattice is empty or its size does not fit its values", "build the shape again");
-    if (data.nodes.empty() || data.nodes.size() != data.node_areas.size())
-        throw Error(where, std::to_string(data.nodes.size()) + " surface nodes and " + std::to_string(data.node_areas.size()) + " areas",
-                    "a grid shape needs the same number of both, at least one");
     if (!(data.volume > 0.0) || !std::isfinite(data.volume))
         throw Error(where, "volume " + to_text(data.volume) + " m3 is not positive", "build the shape again");
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(data.inertia);
-    if (!data.inertia.allFinite() || solver.info() != Eigen::Success || !(solver.eigenvalues().minCoeff() > 0.0))
-        throw Error(where, "the inertia tensor is not positive definite", "build the shape again");
-
     std::shared_ptr<Shape> shape(new Shape);
     shape->kind_ = ShapeKind::grid;
     shape->name_ = where;
     shape->grid_ = std::move(data.distance);
-    shape->nodes_ = std::move(data.nodes);
-    shape->node_areas_ = std::move(data.node_areas);
     shape->volume_ = data.volume;
     shape->apparent_volume_ = data.apparent_volume > 0.0 ? data.apparent_volume : data.volume;
     shape->equivalent_radius_ = equivalent_radius_of(shape->apparent_volume_);
-    shape->inertia_ = data.inertia;
-    shape->principal_inertia_ = solver.eigenvalues();
-    Eigen::Matrix3d axes = solver.eigenvectors();
-    if (axes.determinant() < 0.0) axes.col(2) = -axes.col(2);
-    shape->principal_rotation_ = Eigen::Quaterniond(axes).normalized();
-    for (std::size_t i = 0; i < shape->nodes_.size(); ++i) {
-        const Eigen::Vector3d& node = shape->nodes_[i];
-        if (!node.allFinite() || !(shape->node_areas_[i] >= 0.0))
-            throw Error(where, "surface node " + std::to_string(i) + " or its area is no number", "build the shape again");
-        shape->bounding_radius_ = std::max(shape->bounding_radius_, node.norm());
-    }
+    shape->take_inertia(data.inertia);
+    shape->take_nodes(std::move(data.nodes), std::move(data.node_areas));
     // Nodes lie on the surface, between them the surface may bulge; a tenth of the spacing is far above the sagitta.
     shape->bounding_radius_ += 0.1 * shape->grid_->spacing;
     shape->exterior_reach_ = reach(*shape->grid_);
     shape->sort_nodes();
+    shape->measure_flatness(data.flat_sides);
     return shape;
+}
+
+std::shared_ptr<const Shape> Shape::polyhedron(std::string name, Polyhedron body, SurfaceNodes nodes)
+{
+    std::shared_ptr<Shape> shape(new Shape);
+    shape->kind_ = ShapeKind::polyhedron;
+    shape->name_ = name.empty() ? "polyhedron" : std::move(name);
+    shape->volume_ = shape->apparent_volume_ = body.volume();
+    shape->equivalent_radius_ = equivalent_radius_of(body.volume());
+    shape->exterior_reach_ = std::numeric_limits<double>::infinity();
+    shape->take_inertia(body.inertia());
+    shape->take_nodes(std::move(nodes.positions), std::move(nodes.areas));
+    shape->bounding_radius_ = std::max(shape->bounding_radius_, body.bounding_radius());
+    shape->sort_nodes();
+    std::vector<Eigen::Vector3d> sides;
+    for (std::size_t f = 0; f < body.faces().size(); ++f) sides.push_back(body.normal(int(f)));
+    shape->measure_flatness(sides);
+    shape->polyhedron_ = std::make_shared<const Polyhedron>(std::move(body));
+    return shape;
+}
+
+std::shared_ptr<const Shape> Shape::polyhedron(std::string name, Polyhedron body, int nodes)
+{
+    SurfaceNodes surface = polyhedron_nodes(body, nodes);
+    return polyhedron(std::move(name), std::move(body), std::move(surface));
+}
+
+void Shape::take_nodes(std::vector<Eigen::Vector3d> nodes, std::vector<double> areas)
+{
+    if (nodes.empty() || nodes.size() != areas.size())
+        throw Error(name_, std::to_string(nodes.size()) + " surface nodes and " + std::to_string(areas.size()) + " areas",
+                    "a shape needs the same number of both, at least one");
+    nodes_ = std::move(nodes);
+    node_areas_ = std::move(areas);
+    for (std::size_t i = 0; i < nodes_.size(); ++i) {
+        if (!nodes_[i].allFinite() || !(node_areas_[i] >= 0.0))
+            throw Error(name_, "surface node " + std::to_string(i) + " or its area is no number", "build the shape again");
+        bounding_radius_ = std::max(bounding_radius_, nodes_[i].norm());
+    }
+}
+
+void Shape::take_inertia(const Eigen::Matrix3d& inertia)
+{
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(inertia);
+    if (!inertia.allFinite() || solver.info() != Eigen::Success || !(solver.eigenvalues().minCoeff() > 0.0))
+        throw Error(name_, "the inertia tensor is not positive definite", "build the shape again");
+    inertia_ = inertia;
+    principal_inertia_ = solver.eigenvalues();
+    Eigen::Matrix3d axes = solver.eigenvectors();
+    if (axes.determinant() < 0.0) axes.col(2) = -axes.col(2);
+    principal_rotation_ = Eigen::Quaterniond(axes).normalized();
+}
+
+void Shape::measure_flatness(std::span<const Eigen::Vector3d> directions)
+{
+    constexpr double c = 100.0;  // of the node law [docs/numerics.md, contact]
+    for (const Eigen::Vector3d& n : directions) {
+        double height = -std::numeric_limits<double>::infinity(), area = 0.0;
+        for (const Eigen::Vector3d& p : nodes_) height = std::max(height, n.dot(p));
+        for (std::size_t i = 0; i < nodes_.size(); ++i)
+            if (n.dot(nodes_[i]) > height - equivalent_radius_ / c) area += node_areas_[i];
+        flatness_ = std::max(flatness_, c * area / (2.0 * std::numbers::pi * equivalent_radius_ * equivalent_radius_));
+    }
 }
 
 void Shape::sort_nodes()
@@ -142,12 +188,14 @@ void Shape::sort_nodes()
 
 double Shape::distance(const Eigen::Vector3d& point) const
 {
+    if (kind_ == ShapeKind::polyhedron) return polyhedron_->distance(point);
     return kind_ == ShapeKind::sphere ? point.norm() - radius_ : grid_->sample(point);
 }
 
 double Shape::distance_and_gradient(const Eigen::Vector3d& point, Eigen::Vector3d& gradient) const
 {
     if (kind_ == ShapeKind::grid) return grid_->sample_with_gradient(point, gradient);
+    if (kind_ == ShapeKind::polyhedron) return polyhedron_->distance_and_gradient(point, gradient);
     const double length = point.norm();
     gradient = length > 0.0 ? Eigen::Vector3d(point / length) : Eigen::Vector3d::UnitZ();
     return length - radius_;

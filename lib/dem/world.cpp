@@ -52,10 +52,10 @@ void World::Impl::update_mass(std::size_t i)
 {
     const Shape& s = *shapes[std::size_t(shape[i])];
     const double c = scale[i];
-    is_grid[i] = s.kind() == ShapeKind::grid;
+    has_nodes[i] = s.kind() != ShapeKind::sphere;
     mass[i] = density[i] * s.volume() * c * c * c;
     principal[i] = density[i] * std::pow(c, 5) * s.principal_inertia();
-    radius[i] = c * (is_grid[i] ? s.bounding_radius() : s.radius());
+    radius[i] = c * (has_nodes[i] ? s.bounding_radius() : s.radius());
     equivalent[i] = c * s.equivalent_radius();
     any_prescribed = any_prescribed || motion[i] == Motion::prescribed;
     const bool moves = free(i);
@@ -84,9 +84,9 @@ Vec3 World::Impl::apply_inverse_inertia(std::size_t i, const Vec3& moment) const
 
 double World::Impl::kinetic_energy(std::size_t i) const
 {
-    const double rotation = is_grid[i] && motion[i] == Motion::free
+    const double rotation = has_nodes[i] && motion[i] == Motion::free
                                 ? momentum[i].dot(w[i])
-                                : (is_grid[i] ? w[i].dot(q[i] * shapes[std::size_t(shape[i])]->principal_rotation() *
+                                : (has_nodes[i] ? w[i].dot(q[i] * shapes[std::size_t(shape[i])]->principal_rotation() *
                                                          (((q[i] * shapes[std::size_t(shape[i])]->principal_rotation()).conjugate() * w[i])
                                                               .cwiseProduct(principal[i])))
                                               : principal[i].x() * w[i].squaredNorm());
@@ -172,7 +172,7 @@ int World::add_body(const BodySpec& spec)
     m.material.push_back(spec.material);
     m.motion.push_back(spec.motion);
     m.in.push_back(1);
-    m.is_grid.push_back(0);
+    m.has_nodes.push_back(0);
     m.role.push_back(spec.role);
     const std::size_t i = m.x.size() - 1;
     m.update_mass(i);

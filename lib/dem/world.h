@@ -5,8 +5,8 @@
 /// One step (velocity Verlet; velocities are in step with positions between calls):
 ///     v += dt/2 F/m,  L += dt/2 T;   x += dt v,  orientation by exact rotations about the principal axes;
 ///     contacts at the new positions, friction springs += dt v_t;   v += dt/2 F/m,  L += dt/2 T
-/// Contact laws: docs/numerics.md. Spheres and planes: F = kn delta; sphere on grid: F = kn (R - Phi) grad Phi at the
-/// centre; nodes on a distance field: F_i = k_a A_i u (2 + u^2)/(1 + u^2)^1.5 grad Phi, u = 100 d/d*.
+/// Contact laws: docs/numerics.md. Spheres and planes: F = kn delta; sphere on grid or polyhedron: F = kn (R - Phi) grad Phi at
+/// the centre; nodes on a distance field: F_i = k_a A_i u (2 + u^2)/(1 + u^2)^1.5 grad Phi, u = 100 d/d*.
 /// Steps give the same bits for any number of threads and after restore().
 #include <Eigen/Core>
 #include <Eigen/Geometry>

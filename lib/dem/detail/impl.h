@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "dem/detail/contact_law.h"
+#include "dem/detail/distance_field.h"
 #include "dem/detail/plate.h"
 #include "dem/world.h"
 
@@ -117,11 +118,11 @@ struct World::Impl {
     std::vector<Vec3> added_mass;         ///< inertia of the fluid that moves with a body, per component [kg]; empty or one per body
     std::vector<double> mass, inverse_mass, inverse_inertia;  ///< inverses are 0 unless free; the second for spheres
     std::vector<Vec3> principal;          ///< principal moments [kg m2]
-    std::vector<double> radius;           ///< sphere radius, or bounding radius of a grid
+    std::vector<double> radius;           ///< sphere radius, or bounding radius of another shape
     std::vector<double> equivalent, scale, density;
     std::vector<Index> shape, material;
     std::vector<Motion> motion;
-    std::vector<std::uint8_t> in, is_grid;
+    std::vector<std::uint8_t> in, has_nodes;  ///< has_nodes: no sphere; called a grid below
     std::vector<std::string> role;
     int active = 0;
     bool any_external = false, any_prescribed = false;
