@@ -35,6 +35,38 @@ struct Field {
     }
 };
 
+/// What the trapezoid of the forces at both ends of a step takes from a pair's motion beside what its nodes store: of the order of the
+/// step only where nodes open, close or change to another face, else of the third. Gathered over the nodes; see correct_crossings().
+struct WorkError {
+    double energy = 0.0, stored = 0.0, weight = 0.0;
+    Vec3 push = Vec3::Zero(), arm = Vec3::Zero();
+    bool clamped = false;  ///< a dashpot held a node back: what it lost is booked as damping
+
+    void add(double node_energy, double node_stored, const Vec3& node_push, const Vec3& node_arm)
+    {
+        const double size = node_push.norm();
+        energy += node_energy;
+        stored += node_stored;
+        weight += size;
+        push += node_push;
+        arm += size * node_arm;
+    }
+
+    /// Passes it on for correction, once it is more than the noise of depths.
+    void hand_over(double& owed, Index pair, const GeneralForce& contact, const Vec3& to_b, std::vector<Crossing>& list) const
+    {
+        const double give = owed + energy, size = push.norm();
+        owed = 0.0;
+        if (clamped || !(size > 0.0)) return;
+        if (std::abs(give) < 1e-6 * stored) {
+            if (contact.points > 0) owed = give;
+            return;
+        }
+        const Vec3 at = arm / weight;
+        list.push_back({contact.a, contact.b, give, push / size, to_b + at, at, contact.points > 0 ? pair : -1});
+    }
+};
+
 }  // namespace
 
 void World::Impl::node_loop(double dt)
@@ -44,6 +76,7 @@ void World::Impl::node_loop(double dt)
                              (sphere_walls.body.size() + entry_grain - 1) / entry_grain + (sphere_grids.sphere.size() + grid_grain - 1) / grid_grain;
     parallel_blocks(l.slave.size(), node_grain, [&](std::size_t first, std::size_t last) {
         LoopSums s;
+        std::vector<Crossing>& crossing = crossings[base + first / node_grain];
         for (std::size_t p = first; p < last; ++p) {
             const std::size_t a = std::size_t(l.slave[p]);
             const Index master = l.master[p];
@@ -84,18 +117,37 @@ void World::Impl::node_loop(double dt)
             const double inverse_length = sigmoid / (2.0 * std::min(equivalent[a], reach_b));
             const Eigen::Matrix3d rotation = scale[a] * q[a].toRotationMatrix();
             double total = 0.0;
+            WorkError error;
             for (Index k = l.start[p]; k < l.start[p + 1]; ++k) {
                 const Vec3 arm = rotation * surface.nodes()[std::size_t(l.node[k])];
                 l.arm[k] = arm;
+                const Vec3 old_gradient = l.gradient[k];
+                const double old_depth = l.depth[k];
                 const double depth = -field(x[a] + arm, l.gradient[k]);
                 l.depth[k] = depth;
                 l.force[k] = 0.0;
-                if (depth <= 0.0) continue;
-                const detail::NodePotential potential = detail::node_potential(depth, inverse_length);
+                if (depth <= 0.0 && l.touch[k] == 0) continue;
                 const double area_stiffness = stiffness * surface.node_areas()[std::size_t(l.node[k])];
-                l.force[k] = area_stiffness * potential.force;
-                s.elastic_normal += area_stiffness * potential.energy;
-                total += l.force[k];
+                double stored = 0.0;
+                Vec3 push = Vec3::Zero();
+                if (depth > 0.0) {
+                    const detail::NodePotential potential = detail::node_potential(depth, inverse_length);
+                    l.force[k] = area_stiffness * potential.force;
+                    s.elastic_normal += area_stiffness * potential.energy;
+                    total += l.force[k];
+                    stored = area_stiffness * potential.energy;
+                    push = l.force[k] * l.gradient[k];
+                }
+                if (dt <= 0.0 || l.touch[k] == 2) continue;
+                double released = 0.0;
+                if (l.touch[k] == 1) {
+                    const detail::NodePotential past = detail::node_potential(old_depth, inverse_length);
+                    released = area_stiffness * past.energy;
+                    push += (area_stiffness * past.force) * old_gradient;
+                }
+                const Vec3 turned = dt * w[a].cross(arm), drift = dt * (v[a] - velocity_b);
+                const Vec3 way = drift + dt * w[a].cross(arm - 0.5 * turned) - dt * spin_b.cross(to_b + arm - 0.5 * (drift + turned));
+                error.add(released - stored - 0.5 * push.dot(way), stored + released, push, arm);
             }
             s.tests += l.start[p + 1] - l.start[p];
             const double inverse_total = total > 0.0 ? 1.0 / total : 0.0;
@@ -114,10 +166,16 @@ void World::Impl::node_loop(double dt)
                 const Vec3& arm = l.arm[k];
                 const Vec3 relative = v_end[a] + w[a].cross(arm) - end_b - spin_b.cross(to_b + arm);
                 double fn = l.force[k] * slope;
+                if (!l.touch[k]) l.spring[k].setZero();
+                l.touch[k] = 1;
                 if (pair.damping > 0.0 && weight > 0.0) {
                     LoopSums node_sums;
                     fn = weight * share * normal_force(fn / (weight * share), -relative.dot(n), pair, root_mass, dt, node_sums);
                     s.damping += weight * share * node_sums.damping;
+                    if (fn == 0.0) {
+                        l.touch[k] = 2;
+                        error.clamped = true;
+                    }
                 }
                 l.force[k] = fn;
                 normal_total += fn;
@@ -130,10 +188,8 @@ void World::Impl::node_loop(double dt)
                 const Vec3 relative = v[a] + w[a].cross(arm) - velocity_b - spin_b.cross(to_b + arm);
                 const Vec3 slide = relative - n.dot(relative) * n;
                 const double weight = normal_total > 0.0 ? l.force[k] / normal_total : 0.0;
-                if (!l.touch[k]) l.spring[k].setZero();
                 const Vec3 ft = tangential_force(pair, normal_total / share, n, slide, 0.5 * (w[a] + spin_b).dot(n), root_mass, dt,
                                                  weight * share, l.spring[k], s);
-                l.touch[k] = 1;
                 const Vec3 fn = l.force[k] * n;
                 out.normal_force += fn;
                 out.tangential_force += ft;
@@ -143,6 +199,7 @@ void World::Impl::node_loop(double dt)
                 out.overlap = std::max(out.overlap, l.depth[k]);
                 ++out.points;
             }
+            error.hand_over(l.owed[p], Index(p), out, to_b, crossing);
             if (out.points == 0) continue;
             ++s.touching;
             s.max_overlap = std::max(s.max_overlap, out.overlap / std::min(equivalent[a], reach_b));

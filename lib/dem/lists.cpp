@@ -162,9 +162,12 @@ void append_pair(const World::Impl& world, const NodeList& old, NodeList& l, Ind
     l.slave.push_back(slave);
     l.master.push_back(master);
     l.share.push_back(share);
+    l.owed.push_back(0.0);
     l.start.push_back(Index(l.node.size()));
     l.spring.resize(l.node.size(), Vec3::Zero());
     l.touch.resize(l.node.size(), 0);
+    l.gradient.resize(l.node.size(), Vec3::Zero());
+    l.depth.resize(l.node.size(), 0.0);
     // Springs of the same pair, if it was listed before: pairs and nodes are both in order.
     std::size_t low = 0, high = old.slave.size();
     const std::uint64_t key = key_of(slave, master);
@@ -174,6 +177,7 @@ void append_pair(const World::Impl& world, const NodeList& old, NodeList& l, Ind
         else high = middle;
     }
     if (low == old.slave.size() || key_of(old.slave[low], old.master[low]) != key) return;
+    l.owed.back() = old.owed[low];
     Index k = old.start[low];
     for (std::size_t m = begin; m < l.node.size(); ++m) {
         while (k < old.start[low + 1] && old.node[std::size_t(k)] < l.node[m]) ++k;
@@ -181,6 +185,8 @@ void append_pair(const World::Impl& world, const NodeList& old, NodeList& l, Ind
         if (old.node[std::size_t(k)] != l.node[m]) continue;
         l.spring[m] = old.spring[std::size_t(k)];
         l.touch[m] = old.touch[std::size_t(k)];
+        l.gradient[m] = old.gradient[std::size_t(k)];
+        l.depth[m] = old.depth[std::size_t(k)];
     }
 }
 
@@ -210,10 +216,8 @@ void make_node_list(World::Impl& world, const std::vector<BroadPair>& pairs, dou
     l = {};
     l.start.push_back(0);
     for (const Directed& d : directed) append_pair(world, old, l, d.slave, d.master, skin, d.share);
-    l.gradient.resize(l.node.size(), Vec3::Zero());
     l.arm.resize(l.node.size(), Vec3::Zero());
     l.force.resize(l.node.size());
-    l.depth.resize(l.node.size());
     l.out.resize(l.slave.size());
 }
 
@@ -242,8 +246,8 @@ void World::Impl::make_lists()
     out_count[1].assign(blocks(sphere_walls.body.size(), entry_grain), 0);
     out_count[2].assign(blocks(sphere_grids.sphere.size(), grid_grain), 0);
     const std::size_t points = out_count[0].size() + out_count[1].size() + out_count[2].size();
-    crossings.resize(std::max(crossings.size(), points));
     block_sums.assign(points + blocks(nodes.slave.size(), node_grain), LoopSums{});
+    crossings.resize(std::max(crossings.size(), block_sums.size()));
     x_reference = x;
     q_reference = q;
     for (WallData& wall : walls) wall.reference = wall.point;

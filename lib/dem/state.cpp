@@ -8,7 +8,7 @@ namespace coral::dem {
 
 namespace {
 
-constexpr std::uint64_t magic = 0x3130'4d45'4452'4f43;  // "CORDEM01"
+constexpr std::uint64_t magic = 0x3230'4d45'4452'4f43;  // "CORDEM02"
 
 std::uint64_t checksum(std::span<const std::uint8_t> bytes)
 {
@@ -78,7 +78,7 @@ void visit_state(World::Impl& m, Archive& io)
     SphereGridList& g = m.sphere_grids;
     io(g.sphere), io(g.grid), io(g.touch), io(g.slots), io(g.out);
     NodeList& n = m.nodes;
-    io(n.slave), io(n.master), io(n.start), io(n.node), io(n.spring), io(n.touch), io(n.gradient), io(n.arm), io(n.force), io(n.depth), io(n.share), io(n.out);
+    io(n.slave), io(n.master), io(n.start), io(n.node), io(n.spring), io(n.touch), io(n.gradient), io(n.arm), io(n.force), io(n.depth), io(n.owed), io(n.share), io(n.out);
     io(m.out_count[0]), io(m.out_count[1]), io(m.out_count[2]), io(m.block_sums), io(m.sums), io(m.time);
     io(m.dissipated_friction), io(m.dissipated_damping), io(m.gravity_work), io(m.external_work), io(m.wall_work), io(m.initial), io(m.ledger_started);
     io(m.counters);
@@ -111,7 +111,7 @@ void World::restore(std::span<const std::uint8_t> state)
                     "resume with the case that wrote it");
     visit_state(m, in);
     for (std::size_t i = 0; i < m.x.size(); ++i) m.update_mass(i);
-    m.crossings.resize(std::max(m.crossings.size(), m.out_count[0].size() + m.out_count[1].size() + m.out_count[2].size()));
+    m.crossings.resize(std::max(m.crossings.size(), m.block_sums.size()));
 }
 
 }  // namespace coral::dem

@@ -360,7 +360,7 @@ void World::set_friction(int material, double friction)
 const Material& World::material(int id) const { return impl_->materials[at(id)]; }
 double World::time() const { return impl_->time; }
 double World::critical_time_step() const { return impl_->critical_step(); }
-double World::auto_time_step() const { return impl_->options.step_fraction * impl_->critical_step(); }
+double World::auto_time_step() const { return impl_->automatic_step(); }
 const Counters& World::counters() const { return impl_->counters; }
 
 }  // namespace coral::dem

@@ -118,7 +118,7 @@ public:
     double time() const;  ///< [s]
     /// 1/omega of the stiffest, lightest pair: sqrt(m_min/(2 kn)) [s]; infinite without free bodies. Stable below 2 of it.
     double critical_time_step() const;
-    double auto_time_step() const;  ///< step_fraction times that [s]
+    double auto_time_step() const;  ///< step_fraction times that, less for shapes with flat sides [s]
     /// \throws Error  dt above 1.5 critical steps (unless force_step), a body whose state is no number, a grid whose exterior distances
     ///                do not reach the radius of a sphere at it
     void step(double dt);

@@ -49,6 +49,8 @@ struct Crossing {
     Index a, b;
     double energy;  ///< to give to (> 0) or take from (< 0) the relative motion along the normal
     Vec3 normal, arm_b;
+    Vec3 arm_a = Vec3::Zero();  ///< beside the normal: zero for spheres
+    Index pair = -1;            ///< of the node list, that keeps what cannot be given yet
 };
 
 /// Half list of sphere pairs in compressed rows: partners of sphere i are other[row[i]..row[i+1]), ascending.
@@ -87,9 +89,10 @@ struct NodeList {
     std::vector<Index> slave, master, start;  ///< start has one more entry
     std::vector<Index> node;
     std::vector<Vec3> spring;
-    std::vector<std::uint8_t> touch;
-    std::vector<Vec3> gradient, arm;          ///< scratch of the loop, world frame
-    std::vector<double> force, depth;         ///< scratch of the loop
+    std::vector<std::uint8_t> touch;          ///< 0 apart, 1 touching, 2 touching without force (clamped)
+    std::vector<Vec3> gradient, arm;          ///< of the last step, world frame
+    std::vector<double> force, depth;         ///< of the last step
+    std::vector<double> owed;                 ///< per pair: error of its work that waits for correction [J]
     std::vector<double> share;                ///< 1, or 1/2 for the two directions of a pair
     std::vector<GeneralForce> out;
 };
@@ -188,6 +191,8 @@ struct World::Impl {
     void constraint_work(double dt);
     void step(double dt);
     double critical_step() const;
+    double automatic_step() const;
+    double least_period(bool flat) const;
 };
 
 /// Broad phase: pairs a < b of active bodies with |x_a - x_b| < radius_a + radius_b + skin, ordered; pairs of bodies that both do not
