@@ -10,6 +10,8 @@ std::string_view to_string(ShapeKind kind)
     switch (kind) {
         case ShapeKind::level_set: return "level-set";
         case ShapeKind::sh: return "sh";
+        case ShapeKind::polyhedron: return "polyhedron";
+        case ShapeKind::superellipsoid: return "superellipsoid";
         default: return "sphere";
     }
 }

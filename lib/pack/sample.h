@@ -18,10 +18,10 @@
 
 namespace coral::pack {
 
-enum class ShapeKind { sphere, level_set, sh };
+enum class ShapeKind { sphere, level_set, sh, polyhedron, superellipsoid };
 enum class Role : std::uint8_t { coarse, fine };
 
-/// "sphere", "level-set", "sh"; "coarse", "fine" (the words of specification and file).
+/// "sphere", "level-set", "sh", "polyhedron", "superellipsoid"; "coarse", "fine" (the words of specification and file).
 std::string_view to_string(ShapeKind kind);
 std::string_view to_string(Role role);
 
@@ -34,13 +34,16 @@ struct ShapeTemplate {
     double apparent_volume = 0;       ///< voids filled [m3]
     double equivalent_diameter = 0;   ///< of the sphere of the apparent volume [m]
     Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();  ///< about the centre of mass, at density 1 kg/m3 [m5]
-    /// Distance on a dense lattice, exact in the whole range that contact queries [m]; null for spheres.
+    /// Distance on a dense lattice, exact in the whole range that contact queries [m]; null for spheres and polyhedra.
     std::shared_ptr<const sdf::DistanceGrid> grid;
-    /// The same with voids filled, clamped to a narrow band: tells void from outside. Null for spheres and sh (no voids).
+    /// The same with voids filled, clamped to a narrow band: tells void from outside. Null for shapes without voids.
     std::shared_ptr<const sdf::DistanceGrid> apparent_grid;
     std::vector<Eigen::Vector3d> nodes;  ///< surface nodes, shape frame [m]; empty for spheres
     std::vector<double> node_areas;      ///< their tributary areas; they sum to the surface [m2]
     int degree = 0;                      ///< of the spherical harmonics; 0 for other kinds
+    std::vector<Eigen::Vector3d> vertices;  ///< of a polyhedron, whose hull it is; shape frame [m]
+    Eigen::Vector3d radii = Eigen::Vector3d::Zero();          ///< of a superellipsoid [m]
+    Eigen::Vector2d exponents = Eigen::Vector2d::Ones();      ///< of a superellipsoid: e1, e2 of Barr
     std::vector<double> coefficients;    ///< (degree + 1)^2 real orthonormal coefficients of the radius [m], index l(l+1)+m
 };
 

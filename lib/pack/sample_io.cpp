@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <functional>
@@ -86,10 +87,15 @@ void write_shape(H5File& file, const std::string& group, const ShapeTemplate& sh
     file.set_attribute(group, "equivalent_diameter", shape.equivalent_diameter);
     file.set_attribute(group, "inertia", std::span<const double>(shape.inertia.data(), 9));
     if (shape.kind == ShapeKind::sphere) return;
-    write_grid(file, group + "/distance", *shape.grid);
+    if (shape.kind == ShapeKind::polyhedron) write_rows(file, group + "/vertices", rows(shape.vertices, [](const auto& v) { return v; }));
+    else write_grid(file, group + "/distance", *shape.grid);
     if (shape.apparent_grid) write_grid(file, group + "/apparent_distance", *shape.apparent_grid);
     write_rows(file, group + "/nodes", rows(shape.nodes, [](const auto& n) { return n; }));
     write_column(file, group + "/node_areas", shape.node_areas);
+    if (shape.kind == ShapeKind::superellipsoid) {
+        file.set_attribute(group, "radii", std::span<const double>(shape.radii.data(), 3));
+        file.set_attribute(group, "exponents", std::span<const double>(shape.exponents.data(), 2));
+    }
     if (shape.kind != ShapeKind::sh) return;
     write_column(file, group + "/coefficients", shape.coefficients);
     file.set_attribute(group, "degree", std::int64_t(shape.degree));
@@ -197,13 +203,34 @@ std::shared_ptr<const sdf::DistanceGrid> read_grid(const Reader& in, const std::
     return grid;
 }
 
+std::vector<Eigen::Vector3d> read_vertices(const Reader& in, const std::string& group)
+{
+    const std::string path = group + "/vertices";
+    const std::size_t count = in.count(path);
+    if (count < 4) in.fail(path, "has " + std::to_string(count) + " vertices, a polyhedron has at least four");
+    const auto values = in.numbers(path, count, 3);
+    std::vector<Eigen::Vector3d> vertices;
+    for (std::size_t i = 0; i < count; ++i) vertices.push_back(row3(values, i));
+    return vertices;
+}
+
+void read_superellipsoid(const Reader& in, const std::string& group, ShapeTemplate& shape)
+{
+    const auto radii = in.file().numbers_attribute(group, "radii"), exponents = in.file().numbers_attribute(group, "exponents");
+    if (radii.size() != 3 || exponents.size() != 2) in.fail(group, "attributes radii and exponents need three and two numbers");
+    shape.radii = row3(radii, 0);
+    shape.exponents = {exponents[0], exponents[1]};
+}
+
 ShapeTemplate read_shape(const Reader& in, const std::string& group)
 {
     const H5File& file = in.file();
     ShapeTemplate shape;
     const std::string kind = file.string_attribute(group, "kind");
-    if (kind != "sphere" && kind != "level-set" && kind != "sh") in.fail(group, "kind '" + kind + "' is unknown");
-    shape.kind = kind == "sphere" ? ShapeKind::sphere : kind == "sh" ? ShapeKind::sh : ShapeKind::level_set;
+    constexpr std::array kinds{ShapeKind::sphere, ShapeKind::level_set, ShapeKind::sh, ShapeKind::polyhedron, ShapeKind::superellipsoid};
+    const auto known = std::find_if(kinds.begin(), kinds.end(), [&](ShapeKind k) { return to_string(k) == kind; });
+    if (known == kinds.end()) in.fail(group, "kind '" + kind + "' is unknown");
+    shape.kind = *known;
     shape.name = file.string_attribute(group, "name");
     shape.volume = file.number_attribute(group, "volume");
     shape.apparent_volume = file.number_attribute(group, "apparent_volume");
@@ -213,7 +240,9 @@ ShapeTemplate read_shape(const Reader& in, const std::string& group)
     shape.inertia = Eigen::Map<const Eigen::Matrix3d>(inertia.data());
     if (!(shape.volume > 0) || !(shape.equivalent_diameter > 0)) in.fail(group, "volume and equivalent_diameter must be greater than zero");
     if (shape.kind == ShapeKind::sphere) return shape;
-    shape.grid = read_grid(in, group + "/distance");
+    if (shape.kind == ShapeKind::polyhedron) shape.vertices = read_vertices(in, group);
+    else shape.grid = read_grid(in, group + "/distance");
+    if (shape.kind == ShapeKind::superellipsoid) read_superellipsoid(in, group, shape);
     if (file.exists(group + "/apparent_distance")) shape.apparent_grid = read_grid(in, group + "/apparent_distance");
     const std::size_t count = in.count(group + "/nodes");
     const auto nodes = in.numbers(group + "/nodes", count, 3);
@@ -307,7 +336,7 @@ void check_indices(const Sample& sample, const std::filesystem::path& file)
     }
     for (const Contact& c : sample.contacts) check(c.first >= 0 && c.first < n && c.second >= -walls && c.second < n, "a contact");
     for (const ContactSpring& s : sample.springs) check(s.first >= 0 && s.first < n && s.second >= -walls && s.second < n, "a spring");
-    for (const ShapeTemplate& s : sample.shapes) check(s.kind == ShapeKind::sphere || s.grid, "a shape's lattice");
+    for (const ShapeTemplate& s : sample.shapes) check(s.kind == ShapeKind::sphere || s.grid || !s.vertices.empty(), "a shape's lattice or vertices");
 }
 
 }  // namespace

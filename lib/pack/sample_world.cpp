@@ -2,12 +2,18 @@
 
 #include <algorithm>
 
+#include "dem/superellipsoid.h"
+
 namespace coral::pack {
 
 std::shared_ptr<const dem::Shape> make_shape(const ShapeTemplate& shape)
 {
     if (shape.kind == ShapeKind::sphere) return dem::Shape::sphere(0.5 * shape.equivalent_diameter);
-    return dem::Shape::grid({shape.name, shape.grid, shape.nodes, shape.node_areas, shape.volume, shape.apparent_volume, shape.inertia});
+    if (shape.kind == ShapeKind::polyhedron)
+        return dem::Shape::polyhedron(shape.name, dem::Polyhedron(shape.vertices, shape.name), {shape.nodes, shape.node_areas});
+    if (shape.kind == ShapeKind::superellipsoid)
+        return dem::superellipsoid_shape({shape.radii, shape.exponents[0], shape.exponents[1]}, shape.grid, {shape.nodes, shape.node_areas}, shape.name);
+    return dem::Shape::grid({shape.name, shape.grid, shape.nodes, shape.node_areas, shape.volume, shape.apparent_volume, shape.inertia, {}});
 }
 
 SampleIds add_sample(dem::World& world, const Sample& sample, const std::vector<std::string>& with_walls)

@@ -12,6 +12,8 @@
 #include "core/error.h"
 #include "core/hdf5.h"
 #include "core/output_file.h"
+#include "dem/superellipsoid.h"
+#include "pack/sample_world.h"
 
 using namespace coral::pack;
 
@@ -26,10 +28,10 @@ Sample awkward_sample()
     Sample s;
     s.size = {0.1, 1.0 / 3, 0.2};
     s.gravity = {0.1, 0, -9.80665};
-    s.shapes = {unit_sphere(), {}, {}};
-    for (int k : {1, 2}) {
+    s.shapes = {unit_sphere(), {}, {}, {}, {}};
+    for (int k : {1, 2, 3, 4}) {
         ShapeTemplate& t = s.shapes[std::size_t(k)];
-        t.kind = k == 1 ? ShapeKind::level_set : ShapeKind::sh;
+        t.kind = k == 1 ? ShapeKind::level_set : k == 2 ? ShapeKind::sh : k == 3 ? ShapeKind::polyhedron : ShapeKind::superellipsoid;
         t.name = "grains.vdb grain_" + std::to_string(k);
         t.volume = 1.0 / 7;
         t.apparent_volume = 0.3;
@@ -45,16 +47,22 @@ Sample awkward_sample()
             auto filled = std::make_shared<coral::sdf::DistanceGrid>(*grid);
             filled->outside_limit = 0.3;
             t.apparent_grid = filled;
-        } else {
+        } else if (k == 2) {
             t.degree = 1;
             t.coefficients = {uniform(random), uniform(random), 0, uniform(random)};
+        } else if (k == 3) {
+            t.grid = nullptr;
+            for (int i = 0; i < 9; ++i) t.vertices.push_back(vector());
+        } else {
+            t.radii = {1.0 / 3, 0.2, 0.1};
+            t.exponents = {0.7, 1.0 / 7};
         }
         for (int i = 0; i < 5; ++i) t.nodes.push_back(vector()), t.node_areas.push_back(uniform(random));
     }
     s.materials = {{"default", 2780, 2e5, 1e5, 0.7, 0.3}, {"shell", 2650.5, 1e5, 7e4, 0.2, 0.1}};
     for (int i = 0; i < 7; ++i)
         s.particles.push_back({vector(), Eigen::Quaterniond(Eigen::AngleAxisd(uniform(random), vector().normalized())), vector(), vector(),
-                               i % 3, 1e-3 * (i + 1) / 3, i % 2 ? Role::fine : Role::coarse, i % 2});
+                               i % 5, 1e-3 * (i + 1) / 3, i % 2 ? Role::fine : Role::coarse, i % 2});
     s.walls = {{"z-", vector(), Eigen::Vector3d::UnitZ(), 0.1, 49999.5}, {"z+", vector(), -Eigen::Vector3d::UnitZ(), 0, 1.0 / 3}};
     s.contacts = {{0, 3, vector(), vector(), vector(), vector(), 1e-7, 1}, {2, -2, vector(), vector(), vector(), vector(), 1e-9, 12}};
     s.springs = {{0, 3, 0, vector(), Eigen::Vector3d::Zero()}, {2, -2, 4711, vector(), vector()}};
@@ -99,6 +107,9 @@ TEST(SampleFile, comes_back_bit_for_bit)
         EXPECT_EQ(t.shapes[k].nodes, s.shapes[k].nodes);
         EXPECT_EQ(t.shapes[k].node_areas, s.shapes[k].node_areas);
         EXPECT_EQ(t.shapes[k].coefficients, s.shapes[k].coefficients);
+        EXPECT_EQ(t.shapes[k].vertices, s.shapes[k].vertices);
+        EXPECT_EQ(t.shapes[k].radii, s.shapes[k].radii);
+        EXPECT_EQ(t.shapes[k].exponents, s.shapes[k].exponents);
         expect_same_grid(t.shapes[k].grid.get(), s.shapes[k].grid.get());
         expect_same_grid(t.shapes[k].apparent_grid.get(), s.shapes[k].apparent_grid.get());
     }
@@ -129,6 +140,33 @@ TEST(SampleFile, comes_back_bit_for_bit)
     EXPECT_EQ(t.statistics.porosity, 0.456);
     EXPECT_EQ(t.history.size(), 2u);
     EXPECT_EQ(t.history[1].options.at("seed"), "7");
+}
+
+TEST(SampleFile, polyhedra_and_superellipsoids_become_shapes_of_contact)
+{
+    ShapeTemplate t;
+    t.kind = ShapeKind::polyhedron;
+    t.name = "chip";
+    t.vertices = {{1e-3, 0, 0}, {-1e-3, 0, 0}, {0, 1e-3, 0}, {0, -1e-3, 0}, {0, 0, 1e-3}, {0, 0, -1e-3}};
+    const coral::dem::SurfaceNodes nodes = coral::dem::polyhedron_nodes(coral::dem::Polyhedron(t.vertices), 300);
+    t.nodes = nodes.positions;
+    t.node_areas = nodes.areas;
+    const auto chip = make_shape(t);
+    EXPECT_EQ(chip->polyhedron().faces().size(), 8u);
+    EXPECT_EQ(chip->nodes().size(), t.nodes.size());
+    EXPECT_NEAR(chip->volume() / (4.0 / 3.0 * 1e-9), 1.0, 1e-12);
+    t.vertices.resize(3);
+    EXPECT_THROW(make_shape(t), coral::Error);
+
+    ShapeTemplate s;
+    s.kind = ShapeKind::superellipsoid;
+    s.radii = {1.2e-3, 1e-3, 0.8e-3};
+    s.exponents = {0.7, 0.9};
+    const coral::dem::Superellipsoid body{s.radii, 0.7, 0.9};
+    s.grid = std::make_shared<const coral::sdf::DistanceGrid>(coral::dem::tabulate(body, 1e-4, 5e-4));
+    s.nodes = {{1.2e-3, 0, 0}};
+    s.node_areas = {1e-6};
+    EXPECT_NEAR(make_shape(s)->volume() / coral::dem::volume(body), 1.0, 1e-12);
 }
 
 TEST(SampleFile, has_the_same_bytes_when_written_twice)
