@@ -6,6 +6,7 @@
 #include "core/error.h"
 #include "core/output_file.h"
 #include "core/text.h"
+#include "dem/polyhedron.h"
 
 namespace coral::suffusion {
 
@@ -132,28 +133,68 @@ MaterialSpec read_material(const ConfigTable& table)
     return material;
 }
 
+/// Vertices in the case or a mesh file, whose hull is taken. Vertices are tried at once, so that errors have their place.
+void read_polyhedron(const ConfigTable& shape, BodySpec& spec)
+{
+    static const Strings units{"m", "cm", "mm", "um"};
+    if (shape.has("file") == shape.has("vertices")) {
+        shape.error(shape.has("file") ? "file" : "vertices", shape.has("file") ? "stands beside vertices" : "is missing",
+                    "give vertices = [[x, y, z], ...], or file = \"stone.stl\" and its unit");
+        shape.keys();
+        return;
+    }
+    if (shape.has("vertices")) {
+        spec.vertices = shape.vectors("vertices", Dimension::length);
+        if (spec.vertices.empty()) return;
+        try {
+            dem::Polyhedron(spec.vertices, "");
+        } catch (const Error& error) {
+            const string text = error.what();
+            shape.error("vertices", text.starts_with(": ") ? text.substr(2) : text);
+        }
+        return;
+    }
+    spec.file = shape.string("file");
+    const string unit = shape.choice("unit", units);
+    spec.mesh_unit = unit == "m" ? 1.0 : unit == "cm" ? 1e-2 : unit == "mm" ? 1e-3 : 1e-6;
+}
+
+void read_superellipsoid(const ConfigTable& shape, BodySpec& spec)
+{
+    spec.radii = shape.vector("radii", Dimension::length);
+    if (shape.has("radii") && !(spec.radii.minCoeff() > 0)) shape.error("radii", "has a radius that is not above zero");
+    const std::vector<double> e = shape.quantities("exponents", Dimension::number, std::vector<double>{1, 1});
+    if (e.size() != 2) {
+        shape.error("exponents", "has " + std::to_string(e.size()) + " values", "expected two, [e1, e2]");
+        return;
+    }
+    for (const double value : e)
+        if (!(value > 0 && value <= 2))
+            shape.error("exponents", "has " + to_text(value) + ", outside (0, 2]", "0.1 is nearly a box, 1 an ellipsoid, 2 an octahedron; above 2 the body is hollowed");
+    spec.exponents = {e[0], e[1]};
+}
+
 void read_shape(const ConfigTable& body, BodySpec& spec)
 {
     static const Strings kinds{"sphere", "level-set", "sh", "polyhedron", "superellipsoid"};
     if (!body.has("shape")) {
-        body.error("shape", "is missing", "give shape = { type = \"sphere\", diameter = \"15mm\" }, or a level-set or sh shape");
+        body.error("shape", "is missing", "give shape = { type = \"sphere\", diameter = \"15mm\" }, or another of its types");
         return;
     }
     const ConfigTable shape = body.table("shape");
-    const string kind = shape.choice("type", kinds);
-    if (kind == "polyhedron" || kind == "superellipsoid") {
-        shape.keys();
-        shape.error("type", "\"" + kind + "\" is not supported yet", "use sphere, level-set or sh");
-    } else if (kind == "level-set") {
-        spec.shape = ShapeKind::level_set;
-        spec.file = shape.string("file");
-        spec.grid = shape.string("grid");
-    } else if (kind == "sh") {
-        spec.shape = ShapeKind::harmonics;
-        spec.file = shape.string("file");
-        spec.grid = shape.is_string("id") ? shape.string("id") : std::to_string(shape.integer("id"));
-    } else {
-        spec.diameter = positive(shape, "diameter", Dimension::length);
+    spec.shape = read_choice<ShapeKind>(shape, "type", kinds, nullptr);
+    switch (spec.shape) {
+        case ShapeKind::sphere: spec.diameter = positive(shape, "diameter", Dimension::length); break;
+        case ShapeKind::level_set:
+            spec.file = shape.string("file");
+            spec.grid = shape.string("grid");
+            break;
+        case ShapeKind::harmonics:
+            spec.file = shape.string("file");
+            spec.grid = shape.is_string("id") ? shape.string("id") : std::to_string(shape.integer("id"));
+            break;
+        case ShapeKind::polyhedron: read_polyhedron(shape, spec); break;
+        case ShapeKind::superellipsoid: read_superellipsoid(shape, spec); break;
     }
 }
 

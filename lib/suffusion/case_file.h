@@ -17,7 +17,7 @@ namespace coral::suffusion {
 enum class BoundaryKind { slip, wall, inlet, outlet, periodic };
 enum class BodyMotion { free, fixed, prescribed };
 enum class Scheme { automatic, resolved, semi_resolved, unresolved };
-enum class ShapeKind { sphere, level_set, harmonics };
+enum class ShapeKind { sphere, level_set, harmonics, polyhedron, superellipsoid };
 enum class WallKind { plane, plate, box };
 
 /// Faces in the order x- x+ y- y+ z- z+.
@@ -55,8 +55,12 @@ struct MaterialSpec {
 struct BodySpec {
     ShapeKind shape = ShapeKind::sphere;
     double diameter = 0;         ///< sphere [m]
-    std::filesystem::path file;  ///< level-set: .vdb, sh: .sh.h5
+    std::filesystem::path file;  ///< level-set: .vdb, sh: .sh.h5, polyhedron: mesh
     std::string grid;            ///< grid of the .vdb, or id in the .sh.h5
+    double mesh_unit = 0;        ///< of the coordinates of a polyhedron's mesh [m]
+    std::vector<Eigen::Vector3d> vertices;                       ///< polyhedron without a file; their hull counts [m]
+    Eigen::Vector3d radii = Eigen::Vector3d::Zero();             ///< superellipsoid [m]
+    std::array<double, 2> exponents{1, 1};                       ///< superellipsoid: e1, e2 of Barr
     double scale = 1;
     Eigen::Vector3d position = Eigen::Vector3d::Zero();          ///< centre of mass [m]
     Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();

@@ -26,6 +26,14 @@ void add(FrameArray& array, const Vector3d& v)
 FrameWriter::FrameWriter(const Simulation& simulation)
     : interval_(simulation.scene().description.output.frames), duration_(simulation.scene().description.time.duration)
 {
+    if (!(interval_ > 0)) return;
+    const dem::World& world = simulation.scene().world;
+    for (int body = 0; body < world.body_count(); ++body) {
+        const std::size_t shape = static_cast<std::size_t>(world.shape_id(body));
+        if (shape >= surfaces_.size()) surfaces_.resize(shape + 1);
+        if (surfaces_[shape].polygons.empty()) surfaces_[shape] = viewing_surface(world.shape(body));
+        any_surface_ = any_surface_ || !surfaces_[shape].polygons.empty();
+    }
 }
 
 void FrameWriter::clear() const
@@ -35,7 +43,7 @@ void FrameWriter::clear() const
     std::vector<fs::path> old;
     for (const fs::directory_entry& entry : fs::directory_iterator(folder_, ignored)) {
         const std::string extension = entry.path().extension().string(), name = entry.path().filename().string();
-        if ((extension == ".vti" || extension == ".vtu" || extension == ".pvd") && (name.starts_with("fluid") || name.starts_with("bodies"))) old.push_back(entry.path());
+        if ((extension == ".vti" || extension == ".vtu" || extension == ".pvd") && (name.starts_with("fluid") || name.starts_with("bodies") || name.starts_with("surfaces"))) old.push_back(entry.path());
     }
     for (const fs::path& file : old) fs::remove(file, ignored);
 }
@@ -67,6 +75,28 @@ void FrameWriter::write_bodies(const Simulation& simulation, const std::string& 
     write_points(folder_ / name, positions, arrays);
 }
 
+void FrameWriter::write_surfaces(const Simulation& simulation, const std::string& name) const
+{
+    const dem::World& world = simulation.scene().world;
+    std::vector<Vector3d> positions;
+    std::vector<std::vector<int>> polygons;
+    std::array<FrameArray, 3> arrays{{{"id", 1, {}}, {"shape", 1, {}}, {"velocity", 3, {}}}};
+    for (int body = 0; body < world.body_count(); ++body) {
+        if (!world.active(body)) continue;
+        const Surface& surface = surfaces_[static_cast<std::size_t>(world.shape_id(body))];
+        const int first = static_cast<int>(positions.size());
+        for (const Vector3d& v : surface.vertices) positions.push_back(world.position(body) + world.orientation(body) * (world.scale(body) * v));
+        for (std::vector<int> polygon : surface.polygons) {
+            for (int& v : polygon) v += first;
+            polygons.push_back(std::move(polygon));
+            arrays[0].values.push_back(static_cast<float>(body));
+            arrays[1].values.push_back(static_cast<float>(world.shape_id(body)));
+            add(arrays[2], world.velocity(body));
+        }
+    }
+    write_polygons(folder_ / name, positions, polygons, arrays);
+}
+
 void FrameWriter::write_fluid(const Simulation& simulation, const std::string& name) const
 {
     const fluid::Flow& flow = simulation.flow();
@@ -92,14 +122,19 @@ void FrameWriter::write(const Simulation& simulation)
     if (failed) throw Error(folder_.string(), "cannot be made: " + failed.message(), "choose a folder that can be written");
     const std::size_t number = times_.size();
     times_.push_back(simulation.time());
-    std::vector<std::string> bodies, fluids;
+    std::vector<std::string> bodies, surfaces, fluids;
     for (std::size_t i = 0; i < times_.size(); ++i) {
         bodies.push_back(file_name("bodies", i, "vtu"));
+        surfaces.push_back(file_name("surfaces", i, "vtu"));
         fluids.push_back(file_name("fluid", i, "vti"));
     }
     if (!simulation.scene().bodies.empty()) {
         write_bodies(simulation, bodies[number]);
         write_collection(folder_ / "bodies.pvd", times_, bodies);
+    }
+    if (any_surface_) {
+        write_surfaces(simulation, surfaces[number]);
+        write_collection(folder_ / "surfaces.pvd", times_, surfaces);
     }
     if (!simulation.has_flow()) return;
     write_fluid(simulation, fluids[number]);

@@ -1,10 +1,12 @@
 #pragma once
 /// \file suffusion/frame_writer.h
-/// The frames of a run: frames/fluid_<n>.vti, frames/bodies_<n>.vtu, and fluid.pvd, bodies.pvd with their times.
+/// The frames of a run: frames/fluid_<n>.vti, frames/bodies_<n>.vtu (points), frames/surfaces_<n>.vtu (bodies that are no spheres), and
+/// fluid.pvd, bodies.pvd, surfaces.pvd with their times.
 #include <filesystem>
 #include <string>
 #include <vector>
 
+#include "suffusion/shapes.h"
 #include "suffusion/simulation.h"
 
 namespace coral::suffusion {
@@ -23,10 +25,13 @@ public:
 
 private:
     void write_bodies(const Simulation& simulation, const std::string& name) const;
+    void write_surfaces(const Simulation& simulation, const std::string& name) const;
     void write_fluid(const Simulation& simulation, const std::string& name) const;
 
     std::filesystem::path folder_;
     double interval_, duration_;
+    std::vector<Surface> surfaces_;  ///< by shape of the world
+    bool any_surface_ = false;
     std::vector<double> times_;
 };
 

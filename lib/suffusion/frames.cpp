@@ -55,6 +55,28 @@ std::string text_arrays(std::span<const FrameArray> arrays)
 
 std::string text_vector(double x, double y, double z) { return to_text(x) + " " + to_text(y) + " " + to_text(z); }
 
+void write_cells(const std::filesystem::path& file, std::span<const Eigen::Vector3d> positions, std::span<const std::vector<int>> cells,
+                 std::uint8_t type, const std::string& section, std::span<const FrameArray> arrays)
+{
+    std::vector<float> points;
+    for (const Eigen::Vector3d& p : positions)
+        for (int k = 0; k < 3; ++k) points.push_back(static_cast<float>(p[k]));
+    std::vector<std::int32_t> connectivity, offsets;
+    for (const std::vector<int>& cell : cells) {
+        connectivity.insert(connectivity.end(), cell.begin(), cell.end());
+        offsets.push_back(static_cast<std::int32_t>(connectivity.size()));
+    }
+    const std::vector<std::uint8_t> types(cells.size(), type);
+    std::string text = file_header("UnstructuredGrid");
+    text += "<UnstructuredGrid>\n<Piece NumberOfPoints=\"" + std::to_string(positions.size()) + "\" NumberOfCells=\"" + std::to_string(cells.size()) +
+            "\">\n<Points>\n";
+    text += data_array<float>("Points", 3, "Float32", points) + "</Points>\n<Cells>\n";
+    text += data_array<std::int32_t>("connectivity", 1, "Int32", connectivity) + data_array<std::int32_t>("offsets", 1, "Int32", offsets) +
+            data_array<std::uint8_t>("types", 1, "UInt8", types) + "</Cells>\n<" + section + ">\n";
+    text += text_arrays(arrays) + "</" + section + ">\n</Piece>\n</UnstructuredGrid>\n</VTKFile>\n";
+    write_text_file(file, text);
+}
+
 }  // namespace
 
 std::string encode_array(const void* data, std::size_t bytes)
@@ -93,23 +115,15 @@ void write_image(const std::filesystem::path& file, const Eigen::Vector3d& origi
 
 void write_points(const std::filesystem::path& file, std::span<const Eigen::Vector3d> positions, std::span<const FrameArray> arrays)
 {
-    const std::size_t count = positions.size();
-    std::vector<float> points(3 * count);
-    std::vector<std::int32_t> connectivity(count), offsets(count);
-    for (std::size_t i = 0; i < count; ++i) {
-        for (int k = 0; k < 3; ++k) points[3 * i + k] = static_cast<float>(positions[i][k]);
-        connectivity[i] = static_cast<std::int32_t>(i);
-        offsets[i] = static_cast<std::int32_t>(i + 1);
-    }
-    const std::vector<std::uint8_t> types(count, 1);  // VTK_VERTEX
-    const std::string number = std::to_string(count);
-    std::string text = file_header("UnstructuredGrid");
-    text += "<UnstructuredGrid>\n<Piece NumberOfPoints=\"" + number + "\" NumberOfCells=\"" + number + "\">\n<Points>\n";
-    text += data_array<float>("Points", 3, "Float32", points) + "</Points>\n<Cells>\n";
-    text += data_array<std::int32_t>("connectivity", 1, "Int32", connectivity) + data_array<std::int32_t>("offsets", 1, "Int32", offsets) +
-            data_array<std::uint8_t>("types", 1, "UInt8", types) + "</Cells>\n<PointData>\n";
-    text += text_arrays(arrays) + "</PointData>\n</Piece>\n</UnstructuredGrid>\n</VTKFile>\n";
-    write_text_file(file, text);
+    std::vector<std::vector<int>> cells(positions.size());
+    for (std::size_t i = 0; i < cells.size(); ++i) cells[i] = {static_cast<int>(i)};
+    write_cells(file, positions, cells, 1, "PointData", arrays);  // VTK_VERTEX
+}
+
+void write_polygons(const std::filesystem::path& file, std::span<const Eigen::Vector3d> positions, std::span<const std::vector<int>> polygons,
+                    std::span<const FrameArray> arrays)
+{
+    write_cells(file, positions, polygons, 7, "CellData", arrays);  // VTK_POLYGON
 }
 
 void write_collection(const std::filesystem::path& file, std::span<const double> times, std::span<const std::string> files)

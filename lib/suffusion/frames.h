@@ -24,6 +24,10 @@ void write_image(const std::filesystem::path& file, const Eigen::Vector3d& origi
 /// Points with data, as an unstructured grid of vertices. \param positions [m], one for each point
 void write_points(const std::filesystem::path& file, std::span<const Eigen::Vector3d> positions, std::span<const FrameArray> arrays);
 
+/// Polygons with data, as an unstructured grid. \param arrays  one entry for each polygon
+void write_polygons(const std::filesystem::path& file, std::span<const Eigen::Vector3d> positions, std::span<const std::vector<int>> polygons,
+                    std::span<const FrameArray> arrays);
+
 /// Collection of files with their times. \param files paths relative to the .pvd
 void write_collection(const std::filesystem::path& file, std::span<const double> times, std::span<const std::string> files);
 

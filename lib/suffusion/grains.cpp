@@ -17,6 +17,17 @@ fluid::BodyShape flow_shape(const dem::Shape& shape, double scale)
 {
     if (shape.kind() == dem::ShapeKind::sphere) return fluid::sphere_shape(2 * shape.radius() * scale);
     fluid::BodyShape result;
+    if (shape.kind() == dem::ShapeKind::polyhedron) {
+        const dem::Polyhedron& body = shape.polyhedron();
+        for (const Vector3d& v : body.vertices()) {
+            result.box_min = result.box_min.cwiseMin(scale * v);
+            result.box_max = result.box_max.cwiseMax(scale * v);
+        }
+        result.distance = [&body, scale](std::span<const Vector3d> points, std::span<double> distances) {
+            for (std::size_t i = 0; i < points.size(); ++i) distances[i] = scale * body.distance(points[i] / scale);
+        };
+        return result;
+    }
     const sdf::DistanceGrid& grid = shape.distance_grid();
     const double reach = shape.bounding_radius();
     result.box_min = scale * grid.origin.cwiseMax(Vector3d::Constant(-reach));

@@ -9,18 +9,11 @@
 #include "core/text.h"
 #include "pack/sample.h"
 #include "pack/sample_world.h"
-#include "sdf/extend.h"
-#include "sdf/mass_properties.h"
-#include "sdf/surface_nodes.h"
-#include "sdf/vdb_io.h"
-#include "sh/shape_file.h"
-#include "sh/tabulate.h"
+#include "suffusion/shapes.h"
 
 namespace coral::suffusion {
 
 namespace {
-
-constexpr int level_set_nodes = 6000, harmonics_nodes = 2500;  // docs/numerics.md, contact
 
 dem::Motion motion_of(BodyMotion motion)
 {
@@ -30,55 +23,6 @@ dem::Motion motion_of(BodyMotion motion)
 dem::Material material_of(const std::string& name, const MaterialSpec& spec)
 {
     return {name, spec.density, spec.normal_stiffness, spec.tangential_stiffness, spec.friction, spec.damping};
-}
-
-std::shared_ptr<const dem::Shape> grid_shape(std::string name, sdf::DistanceGrid grid, int nodes, double apparent_volume)
-{
-    const sdf::MassProperties mass = sdf::mass_properties(grid);
-    grid.origin -= mass.centroid;
-    sdf::SurfaceNodes surface = sdf::surface_nodes(grid, nodes);
-    dem::GridShapeData data;
-    data.name = std::move(name);
-    data.nodes = std::move(surface.positions);
-    data.node_areas = std::move(surface.areas);
-    data.volume = mass.volume;
-    data.apparent_volume = apparent_volume;
-    data.inertia = mass.inertia;
-    data.distance = std::make_shared<const sdf::DistanceGrid>(std::move(grid));
-    return dem::Shape::grid(std::move(data));
-}
-
-std::shared_ptr<const dem::Shape> level_set_shape(const BodySpec& body, const std::filesystem::path& file, double reach)
-{
-    const sdf::GrainReader reader(file);
-    std::string digits = body.grid;
-    const bool apparent = digits.ends_with("_apparent");
-    if (apparent) digits.resize(digits.size() - 9);
-    if (digits.starts_with("grain_")) digits = digits.substr(6);
-    const bool number = !digits.empty() && std::ranges::all_of(digits, [](char c) { return c >= '0' && c <= '9'; }) && digits.size() < 10;
-    if (!number || std::ranges::find(reader.ids(), std::stoi(digits)) == reader.ids().end()) {
-        std::vector<std::string> names;
-        for (const int id : reader.ids()) names.push_back("grain_" + std::to_string(id));
-        throw UsageError(body.location, "there is no grid '" + body.grid + "' in " + file.string() + did_you_mean(body.grid, names),
-                         "it holds grain_1 to grain_" + std::to_string(reader.ids().size()));
-    }
-    const sdf::GrainLevelSet grain = reader.read(std::stoi(digits));
-    const sdf::DistanceGrid& grid = apparent ? grain.apparent : grain.solid;
-    return grid_shape(file.filename().string() + " " + body.grid, sdf::extended(grid, reach + 2 * grid.spacing), level_set_nodes,
-                      grain.apparent_volume);
-}
-
-std::shared_ptr<const dem::Shape> harmonics_shape(const BodySpec& body, const std::filesystem::path& file, double reach)
-{
-    const sh::ShapeFile shapes = sh::read_shapes(file);
-    for (const sh::ShapeRecord& record : shapes.shapes) {
-        if (std::to_string(record.id) != body.grid) continue;
-        const double spacing = record.equivalent_diameter / 60;
-        return grid_shape(file.filename().string() + " " + body.grid, sh::tabulate(sh::centred(record.surface), spacing, reach + 2 * spacing),
-                          harmonics_nodes, 0);
-    }
-    throw UsageError(body.location, "there is no shape '" + body.grid + "' in " + file.string(),
-                     "it holds " + std::to_string(shapes.shapes.size()) + " shapes");
 }
 
 /// Largest sphere of the case [m]: grids must answer distances that far outside.
@@ -113,14 +57,9 @@ void add_bodies(Scene& scene, const std::map<std::string, int>& materials)
     const double reach = largest_sphere_radius(c);
     std::map<std::string, int> shapes;
     for (const BodySpec& spec : c.bodies) {
-        // Grids are shared by all bodies of one file and grid; the reach is in metres of the unscaled shape.
-        const std::string key = spec.shape == ShapeKind::sphere ? "" : spec.file.string() + "\n" + spec.grid;
-        if (!shapes.contains(key)) {
-            const std::filesystem::path file = c.folder / spec.file;
-            shapes[key] = scene.world.add_shape(spec.shape == ShapeKind::sphere      ? dem::Shape::sphere(0.5)
-                                                : spec.shape == ShapeKind::level_set ? level_set_shape(spec, file, reach / std::min(1.0, spec.scale))
-                                                                                     : harmonics_shape(spec, file, reach / std::min(1.0, spec.scale)));
-        }
+        // Shapes are shared by all bodies that ask for the same; the reach is in metres of the unscaled shape.
+        const std::string key = shape_key(spec);
+        if (!shapes.contains(key)) shapes[key] = scene.world.add_shape(make_shape(spec, c.folder, reach / std::min(1.0, spec.scale)));
         dem::BodySpec body;
         body.shape = shapes[key];
         body.material = materials.at(spec.material);
