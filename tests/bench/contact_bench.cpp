@@ -3,7 +3,7 @@
 
 #include <random>
 
-#include "dem/shapes_for_tests.h"
+#include "dem/polyhedra_for_tests.h"
 
 namespace {
 
@@ -86,5 +86,49 @@ void level_set_grains_with_fines(benchmark::State& state)
     run(state, world);
 }
 BENCHMARK(level_set_grains_with_fines)->Unit(benchmark::kMillisecond)->UseRealTime();
+
+/// Stones of 26 faces on a lattice, a little into each other; 20 templates.
+void polyhedra(benchmark::State& state)
+{
+    World world = testing::quiet_world(0.3, 0.7, Vec3(0, 0, -9.81));
+    std::vector<int> shapes;
+    for (unsigned k = 0; k < 20; ++k) shapes.push_back(world.add_shape(testing::polyhedron_shape(testing::stone(26, k))));
+    const int edge = 10;
+    const double pitch = 1.9e-3;
+    world.add_box(Vec3::Zero(), Vec3::Constant(edge * pitch));
+    std::mt19937_64 random(3);
+    std::normal_distribution<double> n;
+    for (int i = 0; i < edge * edge * edge; ++i) {
+        BodySpec body;
+        body.shape = shapes[static_cast<std::size_t>(i % 20)];
+        body.position = pitch * Vec3(i % edge + 0.5, i / edge % edge + 0.5, i / edge / edge + 0.5);
+        const double w = n(random), x = n(random), y = n(random), z = n(random);
+        body.orientation = Eigen::Quaterniond(w, x, y, z).normalized();
+        world.add_body(body);
+    }
+    run(state, world);
+}
+BENCHMARK(polyhedra)->Unit(benchmark::kMillisecond)->UseRealTime();
+
+/// Distance to a stone from points around it: for nodes (planes alone) and exact (spheres, flow).
+void polyhedron_distance(benchmark::State& state)
+{
+    const Polyhedron stone = testing::stone(static_cast<int>(state.range(0)), 4);
+    const bool exact = state.range(1) != 0;
+    std::mt19937_64 random(5);
+    std::uniform_real_distribution<double> u(-1.5e-3, 1.5e-3);
+    std::vector<Vec3> points;
+    for (int i = 0; i < 1024; ++i) {
+        const double x = u(random), y = u(random);
+        points.emplace_back(x, y, u(random));
+    }
+    for (auto _ : state)
+        for (const Vec3& p : points) {
+            Vec3 gradient;
+            benchmark::DoNotOptimize(exact ? stone.distance_and_gradient(p, gradient) : stone.depth_and_normal(p, gradient));
+        }
+    state.SetItemsProcessed(state.iterations() * 1024);
+}
+BENCHMARK(polyhedron_distance)->ArgNames({"faces", "exact"})->ArgsProduct({{12, 26, 60}, {0, 1}});
 
 }  // namespace
