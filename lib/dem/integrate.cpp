@@ -126,6 +126,7 @@ bool World::Impl::kick_and_drift(double dt)
 {
     const Vec3 half_g = 0.5 * dt * options.gravity;
     const double limit = free_path * skin, limit2 = limit * limit;
+    node_drift = 0.0;
     double finite = 0.0, gravity_way = 0.0, external = 0.0;
     bool expired = false;
     for (std::size_t i = 0; i < x.size(); ++i) {
@@ -154,16 +155,16 @@ bool World::Impl::kick_and_drift(double dt)
         turn_grid(i, dt);
         // |q - q'| is half the angle for small turns; either sign of q is the same turn.
         const double turn = 2.0 * std::min((q[i].coeffs() - q_reference[i].coeffs()).norm(), (q[i].coeffs() + q_reference[i].coeffs()).norm());
-        expired = expired || std::sqrt(moved2) + turn * radius[i] > limit;
+        node_drift = std::max(node_drift, std::sqrt(moved2) + turn * radius[i]);
     }
     gravity_work += gravity_way;
     external_work += external;
     for (WallData& wall : walls) {
         wall.point += dt * wall.velocity;
-        expired = expired || (wall.point - wall.reference).squaredNorm() > limit2;
+        node_drift = std::max(node_drift, (wall.point - wall.reference).norm());
     }
     if (!std::isfinite(finite)) check_numbers();
-    return expired;
+    return expired || node_drift > limit;
 }
 
 void World::Impl::turn_grid(std::size_t i, double dt)

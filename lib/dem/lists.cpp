@@ -117,7 +117,7 @@ void make_sphere_grid_list(World::Impl& world, const std::vector<BroadPair>& pai
 
 /// Nodes of `slave` within the skin of `master`, tested cluster by cluster.
 template <class Distance>
-void append_nodes(const World::Impl& world, Index slave, double skin, const Distance& distance, std::vector<Index>& found)
+void append_nodes(const World::Impl& world, Index slave, double skin, const Distance& distance, NodeList& l)
 {
     const std::size_t a = std::size_t(slave);
     const Shape& shape = *world.shapes[std::size_t(world.shape[a])];
@@ -130,7 +130,10 @@ void append_nodes(const World::Impl& world, Index slave, double skin, const Dist
             const Shape::Cluster& cluster = shape.clusters()[std::size_t(c)];
             if (!near(cluster)) continue;
             for (int n = cluster.begin; n < cluster.end; ++n)
-                if (distance(rotation * shape.nodes()[std::size_t(n)]) < skin) found.push_back(n);
+                if (const double d = distance(rotation * shape.nodes()[std::size_t(n)]); d < skin) {
+                    l.node.push_back(n);
+                    l.clearance.push_back(d);
+                }
         }
     }
 }
@@ -145,17 +148,17 @@ void append_pair(const World::Impl& world, const NodeList& old, NodeList& l, Ind
         const double scale = world.scale[b];
         const Eigen::Matrix3d to_local = world.q[b].toRotationMatrix().transpose() / scale;
         const detail::DistanceField field(*world.shapes[std::size_t(world.shape[b])]);
-        append_nodes(world, slave, skin, [&](const Vec3& arm) { return scale * field.lower_bound(to_local * (to_b + arm)); }, l.node);
+        append_nodes(world, slave, skin, [&](const Vec3& arm) { return scale * field.lower_bound(to_local * (to_b + arm)); }, l);
     } else {
         const WallData& wall = world.walls[std::size_t(-1 - master)];
         if (wall.kind == WallData::Kind::plane) {
             const double height = wall.normal.dot(world.x[a] - wall.point);
             if (height > world.radius[a] + skin) return;
-            append_nodes(world, slave, skin, [&](const Vec3& arm) { return height + wall.normal.dot(arm); }, l.node);
+            append_nodes(world, slave, skin, [&](const Vec3& arm) { return height + wall.normal.dot(arm); }, l);
         } else {
             Vec3 gradient;
             if (wall.plate.distance_and_gradient(world.x[a], gradient) > world.radius[a] + skin) return;
-            append_nodes(world, slave, skin, [&](const Vec3& arm) { return wall.plate.distance_and_gradient(world.x[a] + arm, gradient); }, l.node);
+            append_nodes(world, slave, skin, [&](const Vec3& arm) { return wall.plate.distance_and_gradient(world.x[a] + arm, gradient); }, l);
         }
     }
     if (l.node.size() == begin) return;
@@ -251,6 +254,7 @@ void World::Impl::make_lists()
     x_reference = x;
     q_reference = q;
     for (WallData& wall : walls) wall.reference = wall.point;
+    node_drift = 0.0;
     lists_valid = true;
     ++counters.rebuilds;
     counters.seconds_lists += seconds_since(start);

@@ -78,7 +78,7 @@ void visit_state(World::Impl& m, Archive& io)
     SphereGridList& g = m.sphere_grids;
     io(g.sphere), io(g.grid), io(g.touch), io(g.slots), io(g.out);
     NodeList& n = m.nodes;
-    io(n.slave), io(n.master), io(n.start), io(n.node), io(n.spring), io(n.touch), io(n.gradient), io(n.arm), io(n.force), io(n.depth), io(n.owed), io(n.share), io(n.out);
+    io(n.slave), io(n.master), io(n.start), io(n.node), io(n.spring), io(n.touch), io(n.gradient), io(n.arm), io(n.force), io(n.depth), io(n.clearance), io(n.owed), io(n.share), io(n.out);
     io(m.out_count[0]), io(m.out_count[1]), io(m.out_count[2]), io(m.block_sums), io(m.sums), io(m.time);
     io(m.dissipated_friction), io(m.dissipated_damping), io(m.gravity_work), io(m.external_work), io(m.wall_work), io(m.initial), io(m.ledger_started);
     io(m.counters);

@@ -22,6 +22,7 @@ struct LoopSums {
     double elastic_normal = 0, elastic_tangential = 0;  ///< [J]
     double friction = 0, damping = 0;                   ///< dissipated in this step [J]
     std::int64_t touching = 0, tests = 0, deep = 0;
+    std::int64_t node_queries = 0;
     double max_overlap = 0;  ///< overlap / smaller radius
     void add(const LoopSums& o)
     {
@@ -31,6 +32,7 @@ struct LoopSums {
         damping += o.damping;
         touching += o.touching;
         tests += o.tests;
+        node_queries += o.node_queries;
         deep += o.deep;
         max_overlap = std::max(max_overlap, o.max_overlap);
     }

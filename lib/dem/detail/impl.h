@@ -92,6 +92,7 @@ struct NodeList {
     std::vector<std::uint8_t> touch;          ///< 0 apart, 1 touching, 2 touching without force (clamped)
     std::vector<Vec3> gradient, arm;          ///< of the last step, world frame
     std::vector<double> force, depth;         ///< of the last step
+    std::vector<double> clearance;            ///< distance when the list was made [m]
     std::vector<double> owed;                 ///< per pair: error of its work that waits for correction [J]
     std::vector<double> share;                ///< 1, or 1/2 for the two directions of a pair
     std::vector<GeneralForce> out;
@@ -135,6 +136,7 @@ struct World::Impl {
     double skin = 0;
     std::vector<Vec3> x_reference;
     std::vector<Quat> q_reference;
+    double node_drift = 0;  ///< longest way of a wall, or of a point of a body with nodes, since the lists were made (or more) [m]
     SphereList spheres;
     SphereWallList sphere_walls;
     SphereGridList sphere_grids;
