@@ -64,8 +64,8 @@ struct SurfaceNodes {
 };
 
 /// About `count` nodes with the areas around them. Every face is cut into strips along its edges, every strip across; the strips along
-/// the rim are narrow (a tenth of the spacing) and have their nodes on the edges and vertices, so that a corner that comes first is felt
-/// and a face that lies flat is not felt wider than it is.
+/// the rim are narrow (a tenth of the spacing, at most 0.005 of the diameter) and have their nodes on the edges and vertices, so that a
+/// corner that comes first is felt as what it is and a face that lies flat is not felt wider.
 /// \throws Error  count below 4
 SurfaceNodes polyhedron_nodes(const Polyhedron& polyhedron, int count);
 

@@ -155,6 +155,48 @@ TEST(PolyhedronContact, forces_turn_with_the_bodies)
     }
 }
 
+TEST(PolyhedronContact, force_does_not_grow_with_the_number_of_nodes)
+{
+    // Stones of 26 faces pressed into each other until the deepest node of 20000 is 20 um deep, 1 % of the diameter, in 60 poses.
+    const Polyhedron body = stone(26, 4);
+    const auto fine = polyhedron_shape(body, 20000);
+    const std::vector<int> counts{160, 320, 640, 1250, 2500};
+    std::vector<double> mean(counts.size(), 0.0), square(counts.size(), 0.0);
+    std::mt19937_64 random(2);
+    const int poses = 60;
+    for (int pose = 0; pose < poses; ++pose) {
+        const Vec3 u = random_direction(random);
+        const Quat q = random_turn(random);
+        double low = 0.0, high = 3e-3;
+        for (int it = 0; it < 20; ++it) {
+            const double at = 0.5 * (low + high);
+            double depth = 0.0;
+            for (const Vec3& n : fine->nodes()) depth = std::max(depth, -body.distance(q.conjugate() * (n - at * u)));
+            (depth > 2e-5 ? low : high) = at;
+        }
+        const auto force = [&](const std::shared_ptr<const Shape>& shape) {
+            World world = quiet_world(0.0, 0.0);
+            const int id = world.add_shape(shape);
+            add(world, id, Vec3::Zero());
+            add(world, id, 0.5 * (low + high) * u, q);
+            world.contacts();
+            return world.contact_forces()[0].norm();
+        };
+        const double reference = force(fine);
+        for (std::size_t k = 0; k < counts.size(); ++k) {
+            const double ratio = force(polyhedron_shape(body, counts[k])) / reference;
+            mean[k] += ratio / poses;
+            square[k] += ratio * ratio / poses;
+        }
+    }
+    for (std::size_t k = 0; k < counts.size(); ++k)
+        std::printf("%5d nodes: force %.3f +- %.3f of that of 20000\n", counts[k], mean[k], std::sqrt(std::max(square[k] - mean[k] * mean[k], 0.0)));
+    EXPECT_NEAR(mean[4], 1.0, 0.05);
+    EXPECT_NEAR(mean[3], 1.0, 0.2);
+    EXPECT_NEAR(mean[2], 1.0, 0.3);
+    EXPECT_LT(mean[0], 1.2) << "few nodes miss the contact; they must not stand for more than there is";
+}
+
 TEST(Bounce, every_pair_of_shapes_keeps_its_energy_at_the_automatic_step)
 {
     const auto s12 = polyhedron_shape(stone(12, 3)), s40 = polyhedron_shape(stone(40, 5)), block = polyhedron_shape(box({2e-3, 1.6e-3, 1.2e-3})),
