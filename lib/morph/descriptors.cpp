@@ -6,6 +6,7 @@
 
 #include "morph/distance_transform.h"
 #include "morph/hull.h"
+#include "morph/oriented_box.h"
 #include "morph/surface.h"
 
 namespace coral::morph {
@@ -56,8 +57,9 @@ Descriptors measure(const Mask& solid, const ApparentShape& apparent)
     d.sphericity = std::cbrt(36.0 * std::numbers::pi * volume * volume) / d.apparent_surface_area;
     const HullProperties hull = hull_properties(hide.vertices);
     d.convexity = std::min(volume / hull.volume, 1.0);
-    d.elongation = hull.box[1] / hull.box[0];
-    d.flatness = hull.box[2] / hull.box[1];
+    const Eigen::Vector3d box = least_box(hull.corners);
+    d.elongation = box[1] / box[0];
+    d.flatness = box[2] / box[1];
     d.roundness = wadell_roundness(apparent.apparent, d.equivalent_diameter);
     return d;
 }

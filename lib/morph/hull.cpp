@@ -1,10 +1,8 @@
 #include "morph/hull.h"
 
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
-#include <CGAL/Random.h>
 #include <CGAL/Surface_mesh.h>
 #include <CGAL/convex_hull_3.h>
-#include <CGAL/optimal_bounding_box.h>
 
 #include <algorithm>
 #include <array>
@@ -49,14 +47,7 @@ HullProperties hull_properties(std::span<const Eigen::Vector3d> points)
     const double digit = std::pow(10.0, std::floor(std::log10(out.volume)) - 12.0);
     out.volume = std::round(out.volume / digit) * digit;
 
-    // The search for the box is random inside; a fixed seed makes it the same for every grain order and thread.
-    CGAL::get_default_random() = CGAL::Random(0);
-    std::array<Point, 8> box;
-    CGAL::oriented_bounding_box(corners, box, CGAL::parameters::use_convex_hull(false));
-    const std::array<double, 3> edges{std::sqrt(CGAL::squared_distance(box[0], box[1])), std::sqrt(CGAL::squared_distance(box[0], box[3])),
-                                      std::sqrt(CGAL::squared_distance(box[0], box[5]))};
-    out.box = {edges[0], edges[1], edges[2]};
-    std::sort(out.box.data(), out.box.data() + 3, std::greater<>());
+    for (const Point& p : corners) out.corners.emplace_back(p.x(), p.y(), p.z());
     return out;
 }
 

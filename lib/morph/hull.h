@@ -1,14 +1,15 @@
 #pragma once
 /// \file morph/hull.h
-/// Convex hull and least oriented box of a set of points, by CGAL (kept in its own library: CGAL needs -frounding-math).
+/// Convex hull of a set of points, by CGAL (kept in its own library: CGAL needs -frounding-math).
 #include <Eigen/Core>
 #include <span>
+#include <vector>
 
 namespace coral::morph {
 
 struct HullProperties {
-    double volume = 0;                                 ///< of the convex hull [m^3]
-    Eigen::Vector3d box = Eigen::Vector3d::Zero();     ///< edges of the least-volume oriented box, longest first [m]
+    double volume = 0;                     ///< [m^3]
+    std::vector<Eigen::Vector3d> corners;  ///< in a fixed order [m]
 };
 
 /// \throws Error when the points lie in one plane

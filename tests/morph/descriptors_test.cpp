@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <random>
+
 #include <Eigen/Geometry>
 #include <map>
 #include <numbers>
@@ -9,6 +11,7 @@
 #include "core/error.h"
 #include "morph/extraction.h"
 #include "morph/hull.h"
+#include "morph/oriented_box.h"
 #include "morph/surface.h"
 #include "shapes.h"
 
@@ -65,16 +68,32 @@ TEST(Curvature, of_a_sphere_is_one_over_its_radius)
     EXPECT_NEAR(sum / area, 1.0, 0.1);
 }
 
-TEST(Hull, of_a_turned_box_gives_its_edges)
+TEST(Hull, of_a_turned_box_gives_its_volume_and_corners)
 {
     const Eigen::Matrix3d turn = Eigen::AngleAxisd(0.7, Eigen::Vector3d(1, 2, 3).normalized()).toRotationMatrix();
-    std::vector<Eigen::Vector3d> points;
+    std::vector<Eigen::Vector3d> points{turn * Eigen::Vector3d(1, 1, 1)};
     for (int n = 0; n < 8; ++n) points.push_back(turn * Eigen::Vector3d(n & 1 ? 5 : 0, n & 2 ? 3 : 0, n & 4 ? 2 : 0));
     const HullProperties hull = hull_properties(points);
     EXPECT_NEAR(hull.volume, 30.0, 1e-9);
-    EXPECT_NEAR((hull.box - Eigen::Vector3d(5, 3, 2)).norm(), 0.0, 1e-6);
+    EXPECT_EQ(hull.corners.size(), 8u);
+    points.erase(points.begin());
     points.resize(4);  // one face
     EXPECT_THROW(hull_properties(points), Error);
+}
+
+TEST(LeastBox, finds_boxes_known_exactly_however_they_are_turned)
+{
+    std::mt19937 random(1);
+    std::normal_distribution<double> normal;
+    for (int trial = 0; trial < 20; ++trial) {
+        const Eigen::Matrix3d turn = Eigen::Quaterniond(normal(random), normal(random), normal(random), normal(random)).normalized().toRotationMatrix();
+        std::vector<Eigen::Vector3d> box, tetrahedron;
+        for (int n = 0; n < 8; ++n) box.push_back(turn * Eigen::Vector3d(n & 1 ? 5 : 0, n & 2 ? 3 : 0, n & 4 ? 2 : 0));
+        EXPECT_NEAR((least_box(box) - Eigen::Vector3d(5, 3, 2)).norm(), 0.0, 1e-6);
+        // A regular tetrahedron fits a cube by its face diagonals, and no smaller box [O'Rourke 1985].
+        for (const int n : {0, 3, 5, 6}) tetrahedron.push_back(turn * Eigen::Vector3d(n & 1, n >> 1 & 1, n >> 2 & 1));
+        EXPECT_NEAR(least_box(tetrahedron).prod(), 1.0, 1e-6);
+    }
 }
 
 TEST(Descriptors, of_a_sphere_are_all_one)
