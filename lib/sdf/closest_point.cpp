@@ -1,6 +1,7 @@
 #include "sdf/detail/closest_point.h"
 
 #include <algorithm>
+#include <limits>
 
 namespace coral::sdf::detail {
 
@@ -11,6 +12,8 @@ NearestFoot::NearestFoot(const Lattice& lattice, const std::vector<FootPoint>& f
     const std::size_t total = layer_ * (std::size_t(lattice.size.z()) + 2);
     foot_.assign(total, -1);
     squared_.assign(total, 0.0f);  // the frame of border nodes takes no foot
+    for (std::vector<float>* position : {&x_, &y_, &z_}) position->assign(total, std::numeric_limits<float>::infinity());
+    for (int i = 0; i < lattice.size.x(); ++i) along_.push_back(float(lattice.origin.x()) + float(lattice.step) * float(i));
     const float solid2 = float(std::min(reach_solid * reach_solid, 1e30)), open2 = float(std::min(reach_open * reach_open, 1e30));
     std::size_t node = 0;
     for (int k = 0; k < lattice.size.z(); ++k)
@@ -39,9 +42,54 @@ void NearestFoot::scatter()
                     if (d2 < squared_[n]) {
                         squared_[n] = d2;
                         foot_[n] = std::int32_t(f);
+                        x_[n] = feet_[f].position.x();
+                        y_[n] = feet_[f].position.y();
+                        z_[n] = feet_[f].position.z();
                     }
                 }
             }
+    }
+}
+
+/// Offers a row of nodes the feet of another row, whose nodes stand `other` away. Rows do not overlap.
+void NearestFoot::take_from(std::size_t row, std::ptrdiff_t other, float y, float z)
+{
+    const std::size_t from = row + std::size_t(other);
+    const float *px = &x_[from], *py = &y_[from], *pz = &z_[from], *along = along_.data();
+    const std::int32_t* pf = &foot_[from];
+    float *qx = &x_[row], *qy = &y_[row], *qz = &z_[row], *best = &squared_[row];
+    std::int32_t* qf = &foot_[row];
+    const int n = lattice_.size.x();
+#pragma GCC ivdep
+    for (int i = 0; i < n; ++i) {
+        const float ex = along[i] - px[i], ey = y - py[i], ez = z - pz[i], d2 = ex * ex + ey * ey + ez * ez;
+        const bool nearer = d2 < best[i];
+        best[i] = nearer ? d2 : best[i];
+        qx[i] = nearer ? px[i] : qx[i];
+        qy[i] = nearer ? py[i] : qy[i];
+        qz[i] = nearer ? pz[i] : qz[i];
+        qf[i] = nearer ? pf[i] : qf[i];
+    }
+}
+
+/// Carries feet along a row, each node offering its own to the next.
+void NearestFoot::carry_along(std::size_t row, int dx, float y, float z)
+{
+    const int n = lattice_.size.x();
+    std::ptrdiff_t i = dx > 0 ? 0 : n - 1;
+    std::size_t last = row + std::size_t(i);
+    for (int a = 1; a < n; ++a) {
+        i += dx;
+        const std::size_t node = row + std::size_t(i);
+        const float ex = along_[std::size_t(i)] - x_[last], ey = y - y_[last], ez = z - z_[last], d2 = ex * ex + ey * ey + ez * ez;
+        if (d2 < squared_[node]) {
+            squared_[node] = d2;
+            x_[node] = x_[last];
+            y_[node] = y_[last];
+            z_[node] = z_[last];
+            foot_[node] = foot_[last];
+        }
+        last = node;
     }
 }
 
@@ -49,35 +97,17 @@ void NearestFoot::scatter()
 void NearestFoot::sweep(int dx, int dy, int dz)
 {
     const std::ptrdiff_t ox = -dx, oy = -dy * std::ptrdiff_t(row_), oz = -dz * std::ptrdiff_t(layer_);
-    const std::array<std::ptrdiff_t, 7> neighbours = {ox, oy, oz, ox + oy, ox + oz, oy + oz, ox + oy + oz};
     const Eigen::Vector3i n = lattice_.size;
-    const Eigen::Vector3f origin = lattice_.origin.cast<float>();
     const float step = float(lattice_.step);
     for (int c = 0; c < n.z(); ++c) {
         const int k = dz > 0 ? c : n.z() - 1 - c;
-        const float z = origin.z() + step * float(k);
+        const float z = float(lattice_.origin.z()) + step * float(k);
         for (int b = 0; b < n.y(); ++b) {
             const int j = dy > 0 ? b : n.y() - 1 - b;
-            const float y = origin.y() + step * float(j);
-            std::size_t node = padded(dx > 0 ? 0 : n.x() - 1, j, k);
-            for (int a = 0; a < n.x(); ++a, node += std::size_t(std::ptrdiff_t(dx))) {
-                const float x = origin.x() + step * float(dx > 0 ? a : n.x() - 1 - a);
-                std::int32_t own = foot_[node], seen = -1;
-                float best = squared_[node];
-                for (const std::ptrdiff_t offset : neighbours) {
-                    const std::int32_t candidate = foot_[node + std::size_t(offset)];
-                    if (candidate < 0 || candidate == own || candidate == seen) continue;
-                    seen = candidate;
-                    const Eigen::Vector3f& p = feet_[std::size_t(candidate)].position;
-                    const float ex = x - p.x(), ey = y - p.y(), ez = z - p.z(), d2 = ex * ex + ey * ey + ez * ez;
-                    if (d2 < best) {
-                        best = d2;
-                        own = candidate;
-                    }
-                }
-                foot_[node] = own;
-                squared_[node] = best;
-            }
+            const float y = float(lattice_.origin.y()) + step * float(j);
+            const std::size_t row = padded(0, j, k);
+            for (const std::ptrdiff_t other : {oy, oz, ox + oy, ox + oz, oy + oz, ox + oy + oz}) take_from(row, other, y, z);
+            carry_along(row, dx, y, z);
         }
     }
 }

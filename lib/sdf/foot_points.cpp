@@ -1,5 +1,7 @@
 #include "sdf/detail/foot_points.h"
 
+#include <cstdint>
+
 #include "core/parallel.h"
 
 namespace coral::sdf::detail {
@@ -17,17 +19,30 @@ Eigen::Vector3d bisect(const CubicField& field, Eigen::Vector3d solid, Eigen::Ve
     return middle;
 }
 
-void take_row(const CubicField& field, int j, int k, std::vector<FootPoint>& feet)
+/// Whether the sign changes between each node of a row and one of its six neighbours; `line` is the row's first node.
+void find_crossings(const CubicField& field, const float* line, std::vector<std::uint8_t>& crossing)
+{
+    const std::ptrdiff_t row = field.row(), layer = field.layer();
+    std::uint8_t* out = crossing.data();
+    for (std::ptrdiff_t i = 1; i < row - 1; ++i) {
+        const bool solid = line[i] < 0;
+        out[i] = ((line[i - 1] < 0) != solid) | ((line[i + 1] < 0) != solid) | ((line[i - row] < 0) != solid) | ((line[i + row] < 0) != solid) |
+                 ((line[i - layer] < 0) != solid) | ((line[i + layer] < 0) != solid);
+    }
+}
+
+void take_row(const CubicField& field, int j, int k, std::vector<std::uint8_t>& crossing, std::vector<FootPoint>& feet)
 {
     const std::ptrdiff_t row = field.row(), layer = field.layer();
     const float* line = field.values + row * j + layer * k;
     const std::ptrdiff_t offsets[6] = {-1, 1, -row, row, -layer, layer};
     const Eigen::Vector3d steps[6] = {{-1, 0, 0}, {1, 0, 0}, {0, -1, 0}, {0, 1, 0}, {0, 0, -1}, {0, 0, 1}};
+    find_crossings(field, line, crossing);
     for (int i = 1; i < field.size.x() - 1; ++i) {
+        if (!crossing[std::size_t(i)]) continue;
         const bool solid = line[i] < 0;
         int side = 0;
-        while (side < 6 && (line[i + offsets[side]] < 0) == solid) ++side;
-        if (side == 6) continue;
+        while ((line[i + offsets[side]] < 0) == solid) ++side;
         const Eigen::Vector3d node(i, j, k);
         Eigen::Vector3d p = node, normal;
         if (!field.project(p, normal) || (p - node).squaredNorm() > 2.25) {
@@ -46,8 +61,9 @@ std::vector<FootPoint> find_foot_points(const CubicField& field)
     const std::size_t layers = std::size_t(field.size.z());
     std::vector<std::vector<FootPoint>> parts((layers + layers_per_block - 1) / layers_per_block);
     parallel_blocks(layers, layers_per_block, [&](std::size_t begin, std::size_t end) {
+        std::vector<std::uint8_t> crossing(std::size_t(field.size.x()));
         for (std::size_t k = std::max<std::size_t>(begin, 1); k < std::min(end, layers - 1); ++k)
-            for (int j = 1; j < field.size.y() - 1; ++j) take_row(field, j, int(k), parts[begin / layers_per_block]);
+            for (int j = 1; j < field.size.y() - 1; ++j) take_row(field, j, int(k), crossing, parts[begin / layers_per_block]);
     });
     std::vector<FootPoint> feet;
     std::size_t total = 0;

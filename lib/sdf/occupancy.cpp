@@ -126,7 +126,7 @@ void resample_axis(OccupancyField& field, int axis, double from, double to)
         for (int j = 0; j < size.y(); ++j)
             for (int i = 0; i < size.x(); ++i, ++n) {
                 Eigen::Vector3i at(i, j, k);
-                std::array<float, 4> w, slope;
+                Eigen::Array4f w, slope;
                 at[axis] = CubicField::weights(at[axis] * to / from, field.size[axis], w, slope);
                 const float* a = field.values.data() + at.x() + std::ptrdiff_t(field.size.x()) * (at.y() + std::ptrdiff_t(field.size.y()) * at.z());
                 values[n] = w[0] * a[0] + w[1] * a[stride] + w[2] * a[2 * stride] + w[3] * a[3 * stride];

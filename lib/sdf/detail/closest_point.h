@@ -39,12 +39,16 @@ private:
     }
     void scatter();
     void sweep(int dx, int dy, int dz);
+    void take_from(std::size_t row, std::ptrdiff_t other, float y, float z);
+    void carry_along(std::size_t row, int dx, float y, float z);
 
     const Lattice& lattice_;
     const std::vector<FootPoint>& feet_;
     std::size_t row_, layer_;             // of the arrays below, which have one node more on each side: no border checks
     std::vector<std::int32_t> foot_;
     std::vector<float> squared_;          // to the foot; starts at the squared reach
+    std::vector<float> x_, y_, z_;        // of the foot, beside its number: whole rows are then compared at once
+    std::vector<float> along_;            // x of the nodes of a row
 };
 
 /// Closest point by steps along the tangent plane and back onto the surface, kept while they come nearer.

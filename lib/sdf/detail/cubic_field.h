@@ -22,7 +22,7 @@ struct CubicField {
 
     /// Weights of the four nodes around a position, and their derivatives; returns the first node. Within one step of the
     /// border the outermost four nodes are used, as an extrapolation.
-    static int weights(double x, int count, std::array<float, 4>& w, std::array<float, 4>& slope)
+    static int weights(double x, int count, Eigen::Array4f& w, Eigen::Array4f& slope)
     {
         const int first = std::clamp(int(std::floor(x)) - 1, 0, count - 4);
         const float t = float(x - (first + 1)), t2 = t * t, t3 = t2 * t;
@@ -33,37 +33,34 @@ struct CubicField {
 
     double value(const Eigen::Vector3d& p, Eigen::Vector3d& gradient) const
     {
-        std::array<float, 4> wx, wy, wz, sx, sy, sz;
+        Eigen::Array4f wx, wy, wz, sx, sy, sz;
         const int i = weights(p.x(), size.x(), wx, sx);
         const int j = weights(p.y(), size.y(), wy, sy);
         const int k = weights(p.z(), size.z(), wz, sz);
         const float* corner = values + i + row() * j + layer() * k;
-        float value = 0, gx = 0, gy = 0, gz = 0;
+        // Lines along x stay four abreast until the end: one load and a few multiplications for each of the sixteen.
+        Eigen::Array4f value = Eigen::Array4f::Zero(), gy = value, gz = value;
         for (int c = 0; c < 4; ++c) {
-            float plane = 0, plane_x = 0, plane_y = 0;
+            Eigen::Array4f plane = Eigen::Array4f::Zero(), plane_y = plane;
             for (int b = 0; b < 4; ++b) {
-                const float* a = corner + layer() * c + row() * b;
-                const float line = wx[0] * a[0] + wx[1] * a[1] + wx[2] * a[2] + wx[3] * a[3];
-                const float line_x = sx[0] * a[0] + sx[1] * a[1] + sx[2] * a[2] + sx[3] * a[3];
+                const Eigen::Array4f line = Eigen::Map<const Eigen::Array4f>(corner + layer() * c + row() * b);
                 plane += wy[b] * line;
-                plane_x += wy[b] * line_x;
                 plane_y += sy[b] * line;
             }
             value += wz[c] * plane;
-            gx += wz[c] * plane_x;
             gy += wz[c] * plane_y;
             gz += sz[c] * plane;
         }
-        gradient = Eigen::Vector3d(gx, gy, gz);
-        return value;
+        gradient = Eigen::Vector3d((value * sx).sum(), (gy * wx).sum(), (gz * wx).sum());
+        return (value * wx).sum();
     }
 
-    /// Newton steps p -= f g/|g|^2, at most 0.7 each, until below 1e-4. Returns whether it got there; normal = g/|g|.
-    bool project(Eigen::Vector3d& p, Eigen::Vector3d& normal, int steps = 4) const
+    /// Newton steps p -= f g/|g|^2, at most 0.7 each, until below `enough`. Returns whether it came within 0.05; normal = g/|g|.
+    bool project(Eigen::Vector3d& p, Eigen::Vector3d& normal, int steps = 4, double enough = 1e-4) const
     {
         Eigen::Vector3d g;
         double move = 1.0;
-        for (int n = 0; n < steps && move > 1e-4; ++n) {
+        for (int n = 0; n < steps && move > enough; ++n) {
             const double f = value(p, g), slope2 = g.squaredNorm();
             if (slope2 < 1e-12) return false;
             const Eigen::Vector3d step = (f / slope2) * g;
