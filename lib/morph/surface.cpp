@@ -3,6 +3,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "core/parallel.h"
 
@@ -58,6 +59,7 @@ public:
         : o_(occupancy), size_(size), edges_(edges), origin_(origin), plane_(std::size_t(size.x()) * std::size_t(size.y()))
     {
         for (auto& slab : slabs_) slab.assign(7 * plane_, 0);
+        codes_.resize(std::size_t(size_.x()));
     }
 
     SurfaceMesh run()
@@ -66,8 +68,11 @@ public:
             std::swap(slabs_[0], slabs_[1]);
             if (k == 0) std::fill(slabs_[0].begin(), slabs_[0].end(), 0U);
             std::fill(slabs_[1].begin(), slabs_[1].end(), 0U);
-            for (int j = 0; j + 1 < size_.y(); ++j)
-                for (int i = 0; i + 1 < size_.x(); ++i) cell(i, j, k);
+            for (int j = 0; j + 1 < size_.y(); ++j) {
+                find_corners(j, k);
+                for (int i = 0; i + 1 < size_.x(); ++i)
+                    if (codes_[std::size_t(i)] != 0 && codes_[std::size_t(i)] != 255) cell(i, j, k);
+            }
         }
         return std::move(mesh_);
     }
@@ -76,15 +81,28 @@ private:
     /// Corner bits: 1 = +x, 2 = +y, 4 = +z. The six Kuhn tetrahedra walk from corner 0 to 7 along permutations of the axes.
     static constexpr std::array<std::array<int, 2>, 6> middle{{{1, 3}, {2, 6}, {4, 5}, {1, 5}, {2, 3}, {4, 6}}};  // first three even
 
+    /// Corners inside, as bits, of the cells of a row.
+    void find_corners(int j, int k)
+    {
+        const std::size_t nx = std::size_t(size_.x());
+        const float* row = &o_[std::size_t(k) * plane_ + std::size_t(j) * nx];
+        std::uint8_t* codes = codes_.data();
+        for (std::size_t i = 0; i + 1 < nx; ++i) {
+            int inside = 0;
+            for (std::size_t c = 0; c < 4; ++c) {
+                const float* at = row + (c & 1 ? nx : 0) + (c & 2 ? plane_ : 0) + i;
+                inside |= int(at[0] >= 0.5F) << (2 * c) | int(at[1] >= 0.5F) << (2 * c + 1);
+            }
+            codes[i] = std::uint8_t(inside);
+        }
+    }
+
     void cell(int i, int j, int k)
     {
         const std::size_t base = std::size_t(k) * plane_ + std::size_t(j) * std::size_t(size_.x()) + std::size_t(i);
-        int inside = 0;
-        for (int c = 0; c < 8; ++c) {
+        for (int c = 0; c < 8; ++c)
             corner_[std::size_t(c)] = o_[base + std::size_t(c & 1) + (c & 2 ? std::size_t(size_.x()) : 0) + (c & 4 ? plane_ : 0)];
-            inside |= int(corner_[std::size_t(c)] >= 0.5F) << c;
-        }
-        if (inside == 0 || inside == 255) return;
+        const int inside = codes_[std::size_t(i)];
         at_ = {i, j, k};
         for (std::size_t t = 0; t < 6; ++t) {
             // An odd permutation has its middle corners swapped to make the tetrahedron positive.
@@ -159,6 +177,7 @@ private:
     Eigen::Vector3d edges_, origin_;
     std::size_t plane_;
     std::array<std::vector<std::uint32_t>, 2> slabs_;  ///< vertex numbers + 1 by lowest lattice point and edge direction
+    std::vector<std::uint8_t> codes_;  ///< of the cells of a row
     std::array<float, 8> corner_{};
     std::array<int, 3> at_{};
     SurfaceMesh mesh_;
@@ -270,9 +289,12 @@ std::vector<CurvatureSample> surface_curvature(const Mask& mask, double scale)
     std::vector<float> height = block_occupancy(mask, factor, margin, size);
     smooth(height, size, sigma);
     const SurfaceMesh mesh = Marcher(height, size, edges, Eigen::Vector3d::Zero()).run();
+    const double farthest = -scale * probit(smallest_occupancy);
     parallel_blocks(height.size(), 1 << 14, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t v = begin; v < end; ++v)
-            height[v] = float(-scale * probit(std::clamp(double(height[v]), smallest_occupancy, 1.0 - smallest_occupancy)));
+        for (std::size_t v = begin; v < end; ++v) {
+            const double o = height[v];
+            height[v] = float(o <= smallest_occupancy ? farthest : o >= 1.0 - smallest_occupancy ? -farthest : -scale * probit(o));
+        }
     });
 
     const std::ptrdiff_t dx = 1, dy = size.x(), dz = std::ptrdiff_t(size.x()) * size.y();
@@ -292,25 +314,33 @@ std::vector<CurvatureSample> surface_curvature(const Mask& mask, double scale)
         }
         return largest_curvature(g, h);
     };
+    // Vertices share their lattice points: each of these is worked out once.
+    const auto lowest = [&](const Eigen::Vector3d& p) { return p.array().floor().cast<std::ptrdiff_t>().matrix().dot(Eigen::Matrix<std::ptrdiff_t, 3, 1>(dx, dy, dz)); };
+    const auto corner = [&](int c) { return (c & 1 ? dx : 0) + (c & 2 ? dy : 0) + (c & 4 ? dz : 0); };
+    std::vector<std::ptrdiff_t> nodes;
+    std::vector<std::uint8_t> wanted(height.size(), 0);
+    for (const Eigen::Vector3d& vertex : mesh.vertices)
+        for (int c = 0; c < 8; ++c) {
+            const std::ptrdiff_t v = lowest(vertex.cwiseQuotient(edges)) + corner(c);
+            if (!std::exchange(wanted[std::size_t(v)], 1)) nodes.push_back(v);
+        }
+    std::vector<float> curvature(height.size());
+    parallel_blocks(nodes.size(), 1024, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t n = begin; n < end; ++n) curvature[std::size_t(nodes[n])] = float(at_node(nodes[n]));
+    });
+
     std::vector<CurvatureSample> samples(mesh.vertices.size());
     for (const auto& t : mesh.triangles) {
         const double area = 0.5 * (mesh.vertices[t[1]] - mesh.vertices[t[0]]).cross(mesh.vertices[t[2]] - mesh.vertices[t[0]]).norm();
         for (std::uint32_t v : t) samples[v].area += area / 3.0;
     }
-    parallel_blocks(samples.size(), 1024, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t s = begin; s < end; ++s) {
-            const Eigen::Vector3d p = mesh.vertices[s].cwiseQuotient(edges);
-            const Eigen::Vector3i base = p.array().floor().cast<int>();
-            const Eigen::Vector3d t = p - base.cast<double>();
-            const std::ptrdiff_t v = base.x() + dy * base.y() + dz * base.z();
-            double sum = 0;
-            for (int c = 0; c < 8; ++c) {
-                const double w = (c & 1 ? t.x() : 1 - t.x()) * (c & 2 ? t.y() : 1 - t.y()) * (c & 4 ? t.z() : 1 - t.z());
-                if (w > 1e-9) sum += w * at_node(v + (c & 1 ? dx : 0) + (c & 2 ? dy : 0) + (c & 4 ? dz : 0));
-            }
-            samples[s].largest_curvature = sum;
+    for (std::size_t s = 0; s < samples.size(); ++s) {
+        const Eigen::Vector3d p = mesh.vertices[s].cwiseQuotient(edges), t = p - p.array().floor().matrix();
+        for (int c = 0; c < 8; ++c) {
+            const double w = (c & 1 ? t.x() : 1 - t.x()) * (c & 2 ? t.y() : 1 - t.y()) * (c & 4 ? t.z() : 1 - t.z());
+            if (w > 1e-9) samples[s].largest_curvature += w * double(curvature[std::size_t(lowest(p) + corner(c))]);
         }
-    });
+    }
     return samples;
 }
 
