@@ -6,6 +6,7 @@
 
 #include "morph/components.h"
 #include "morph/detail/closing.h"
+#include "morph/detail/throat.h"
 
 namespace coral::morph {
 namespace {
@@ -25,13 +26,17 @@ Mask crop_margin(const Mask& like, std::span<const std::uint8_t> boxed, const Ei
     return out;
 }
 
-/// Radius of the widest constriction in front of a void that is wider by more than c. [in c]
-double widest_constriction(const Closing& closing, const std::vector<std::uint8_t>& open, const std::vector<float>& bottleneck)
+/// Diameter of the widest constriction in front of a void that is wider by more than c [m]; 0 without one.
+double widest_constriction(const Closing& closing, const std::vector<std::uint8_t>& open, const detail::Bottlenecks& paths)
 {
     float widest = 0;
+    std::size_t saddle = 0;
     for (std::size_t v = 0; v < open.size(); ++v)
-        if (open[v] && detail::behind_constriction(closing.squared[v], bottleneck[v])) widest = std::max(widest, bottleneck[v]);
-    return double(widest);
+        if (open[v] && paths.radius[v] > widest && detail::behind_constriction(closing.squared[v], paths.radius[v])) {
+            widest = paths.radius[v];
+            saddle = paths.saddle[v];
+        }
+    return widest > 0 ? detail::throat_diameter(closing, saddle, widest) : 0.0;
 }
 
 }  // namespace
@@ -56,12 +61,12 @@ ApparentShape close_with_ball(const Mask& solid, double radius, std::vector<Void
     if (out.filled > out.solid) {
         const detail::VoidParts parts = detail::void_parts(closing, voids, std::move(open));
         out.void_count = std::size_t(std::ranges::count(parts.counts, 1));
-        std::vector<float> bottleneck;
+        detail::Bottlenecks paths;
         if (out.open_void > 0) {
-            bottleneck = detail::bottlenecks(closing);
-            out.largest_throat = 2.0 * widest_constriction(closing, parts.open, bottleneck) * detail::mean_edge(solid);
+            paths = detail::bottlenecks(closing);
+            out.largest_throat = widest_constriction(closing, parts.open, paths);
         }
-        if (list) *list = detail::describe_voids(closing, apparent, parts, bottleneck);
+        if (list) *list = detail::describe_voids(closing, apparent, parts, paths);
     }
     out.apparent = crop_margin(solid, apparent, closing.box.size, closing.margin);
     return out;

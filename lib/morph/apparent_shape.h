@@ -25,8 +25,9 @@ struct ApparentShape {
 ///     apparent = {q > R + c/2} or solid
 /// with c the geometric mean of the voxel edges. Closed voids and voids behind throats narrower than 2R fill.
 /// The largest throat follows from b(x) = max over paths from outside of the least d on the path: it is 2 b, the largest
-/// over voids that widen behind the constriction (d > b + c). Round throats are met within c: the widest ball sits on a voxel
-/// centre, which costs about what the half voxel from solid centre to solid face gives. Voids behind throats wider than 2R are outside and not seen.
+/// over voids that widen behind the constriction (d > b + c), with the ball then moved off the voxel centre (detail/throat.h). Round
+/// throats of ten voxels and more are met within half a voxel, narrower ones within 1.5. Voids behind throats wider than 2R are
+/// outside and not seen.
 /// \param radius  of the ball [m]
 /// \param voids   when given: the voids one by one, largest first; as many as void_count. Costs one more distance transform.
 ApparentShape close_with_ball(const Mask& solid, double radius, std::vector<Void>* voids = nullptr);

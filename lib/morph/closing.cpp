@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
+#include "core/error.h"
 #include "core/parallel.h"
 #include "morph/distance_transform.h"
 
@@ -58,20 +60,23 @@ std::vector<std::uint8_t> unreached(const Closing& closing)
     return apparent;
 }
 
-std::vector<float> bottlenecks(const Closing& closing)
+Bottlenecks bottlenecks(const Closing& closing)
 {
     constexpr int bins_per_edge = 8;
-    std::vector<float> b(closing.squared.size(), 0.0F);
+    const std::size_t count = closing.squared.size();
+    if (count > std::numeric_limits<std::uint32_t>::max()) throw Error("throats", "the box of a grain has more than 2^32 voxels", "coarsen the stack");
+    Bottlenecks out{std::vector<float>(count, 0.0F), std::vector<std::uint32_t>(count, 0)};
+    std::vector<float>& b = out.radius;
     std::vector<std::vector<std::size_t>> buckets(std::size_t(closing.reach * bins_per_edge) + 2);
-    const auto push = [&](std::size_t v, float value) {
-        b[v] = value;
-        buckets[std::min(std::size_t(value * bins_per_edge), buckets.size() - 1)].push_back(v);
-    };
+    const auto bin_of = [&](float value) { return std::min(std::size_t(value * bins_per_edge), buckets.size() - 1); };
     const auto from = [&](std::size_t v, float value) {
         for_faces(v, closing.box.size, [&](std::size_t n) {
             if (closing.box.voxels[n] || closing.outside[n]) return;
-            const float candidate = std::min(value, std::sqrt(closing.squared[n]));
-            if (candidate > b[n]) push(n, candidate);
+            const float own = std::sqrt(closing.squared[n]), candidate = std::min(value, own);
+            if (candidate <= b[n]) return;
+            b[n] = candidate;
+            out.saddle[n] = own < value ? std::uint32_t(n) : out.saddle[v];
+            buckets[bin_of(candidate)].push_back(n);
         });
     };
     for (std::size_t v = 0; v < b.size(); ++v)
@@ -80,9 +85,9 @@ std::vector<float> bottlenecks(const Closing& closing)
         while (!buckets[bin].empty()) {
             const std::size_t v = buckets[bin].back();
             buckets[bin].pop_back();
-            if (std::min(std::size_t(b[v] * bins_per_edge), buckets.size() - 1) == bin) from(v, b[v]);
+            if (bin_of(b[v]) == bin) from(v, b[v]);
         }
-    return b;
+    return out;
 }
 
 }  // namespace coral::morph::detail

@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "morph/detail/closing.h"
+#include "morph/detail/throat.h"
 #include "morph/distance_transform.h"
 
 namespace coral::morph {
@@ -22,27 +23,37 @@ struct Sums {
     Eigen::Vector3d centre = Eigen::Vector3d::Zero();  ///< of voxel numbers
     float squared_width = 0, squared_depth = 0;
     float constricted = 0, widest = 0;  ///< largest bottleneck behind a constriction; of all voxels
+    std::size_t constriction = 0, mouth = 0;  ///< where they are
     bool open = false;
 };
 
-void add(Sums& sums, std::size_t voxel, const Closing& closing, float squared_depth, float bottleneck)
+void add(Sums& sums, std::size_t voxel, const Closing& closing, float squared_depth, const Bottlenecks& paths)
 {
     const std::size_t nx = std::size_t(closing.box.size.x()), ny = std::size_t(closing.box.size.y());
     sums.centre += Eigen::Vector3d(double(voxel % nx), double(voxel / nx % ny), double(voxel / (nx * ny)));
     sums.squared_width = std::max(sums.squared_width, closing.squared[voxel]);
     sums.squared_depth = std::max(sums.squared_depth, squared_depth);
-    sums.widest = std::max(sums.widest, bottleneck);
-    if (behind_constriction(closing.squared[voxel], bottleneck)) sums.constricted = std::max(sums.constricted, bottleneck);
+    if (paths.radius.empty()) return;
+    const float bottleneck = paths.radius[voxel];
+    if (bottleneck > sums.widest) {
+        sums.widest = bottleneck;
+        sums.mouth = paths.saddle[voxel];
+    }
+    if (bottleneck > sums.constricted && behind_constriction(closing.squared[voxel], bottleneck)) {
+        sums.constricted = bottleneck;
+        sums.constriction = paths.saddle[voxel];
+    }
 }
 
-Void from_sums(const Sums& sums, std::size_t voxels, const Mask& box)
+Void from_sums(const Sums& sums, std::size_t voxels, const Closing& closing)
 {
+    const Mask& box = closing.box;
     const double c = mean_edge(box);
     Void v;
     v.voxels = voxels;
     v.volume = double(voxels) * box.voxel_volume();
     v.open = sums.open;
-    if (v.open) v.throat_diameter = 2.0 * c * double(sums.constricted > 0 ? sums.constricted : sums.widest);
+    if (v.open) v.throat_diameter = sums.constricted > 0 ? throat_diameter(closing, sums.constriction, sums.constricted) : throat_diameter(closing, sums.mouth, sums.widest);
     v.width = 2.0 * c * std::sqrt(double(sums.squared_width));
     v.depth = c * (std::sqrt(double(sums.squared_depth)) - 0.5);
     v.centroid = (sums.centre / double(voxels) + box.offset.cast<double>() + Eigen::Vector3d::Constant(0.5)).cwiseProduct(box.voxel_size);
@@ -64,14 +75,14 @@ VoidParts void_parts(const Closing& closing, const std::vector<std::uint8_t>& vo
 }
 
 std::vector<Void> describe_voids(const Closing& closing, const std::vector<std::uint8_t>& apparent, const VoidParts& parts,
-                                 const std::vector<float>& bottleneck)
+                                 const Bottlenecks& paths)
 {
     const std::vector<float> depth = squared_distances(apparent, closing.box.size, 0, closing.box.voxel_size / mean_edge(closing.box));
     std::vector<Sums> sums(parts.counts.size());
     for (std::size_t v = 0; v < depth.size(); ++v) {
         const std::uint32_t part = parts.parts.labels[v];
         if (part == 0 || !parts.counts[part - 1]) continue;
-        add(sums[part - 1], v, closing, depth[v], bottleneck.empty() ? 0.0F : bottleneck[v]);
+        add(sums[part - 1], v, closing, depth[v], paths);
         sums[part - 1].open = sums[part - 1].open || parts.open[v];
     }
     std::vector<std::size_t> order;
@@ -79,7 +90,7 @@ std::vector<Void> describe_voids(const Closing& closing, const std::vector<std::
         if (parts.counts[p]) order.push_back(p);
     std::ranges::stable_sort(order, [&](std::size_t a, std::size_t b) { return parts.parts.sizes[a] > parts.parts.sizes[b]; });
     std::vector<Void> voids;
-    for (const std::size_t p : order) voids.push_back(from_sums(sums[p], parts.parts.sizes[p], closing.box));
+    for (const std::size_t p : order) voids.push_back(from_sums(sums[p], parts.parts.sizes[p], closing));
     return voids;
 }
 

@@ -17,8 +17,8 @@ struct Void {
     double volume = 0;           ///< [m^3]
     bool open = false;           ///< 6-connected to the outside
     /// Bottleneck to the outside [m]: twice the throat transform b(x), the largest ball radius that comes from outside to x [mercury
-    /// intrusion's measure; see bottlenecks in docs/numerics.md], the largest over the voxels behind a constriction (d > b + c). Where
-    /// the void nowhere widens behind its mouth: the largest ball that comes in. 0 when closed.
+    /// intrusion's measure; see bottlenecks in docs/numerics.md], the largest over the voxels behind a constriction (d > b + c), the
+    /// ball moved off the voxel centre. Where the void nowhere widens behind its mouth: the largest ball that comes in. 0 when closed.
     double throat_diameter = 0;
     double width = 0;            ///< diameter of the largest ball in the void [m]
     double depth = 0;            ///< distance of its deepest voxel centre to the apparent surface [m]

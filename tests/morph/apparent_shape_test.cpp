@@ -55,7 +55,7 @@ TEST(ApparentShape, measures_the_throat_before_a_cavity)
 {
     for (const double mouth : {1.6, 2.6, 3.6}) {
         const ApparentShape shape = close_with_ball(flask(mouth), mouth + 1.5);
-        EXPECT_NEAR(shape.largest_throat, 2.0 * mouth, 1.0) << mouth;
+        EXPECT_NEAR(shape.largest_throat, 2.0 * mouth, 0.8) << mouth;
         EXPECT_EQ(shape.closed_void, 0U);
         EXPECT_EQ(shape.void_count, 1U);
     }

@@ -57,6 +57,21 @@ TEST(Voids, with_a_mouth_are_as_wide_as_the_mouth_lets_in)
     }
 }
 
+TEST(Voids, have_slanted_throats_measured_below_the_voxel)
+{
+    const double radius = 5.0;
+    for (const Eigen::Vector3d& way : {Eigen::Vector3d(0.31, -0.85, 0.42), Eigen::Vector3d(-0.6, 0.5, 0.7), Eigen::Vector3d(0.95, 0.2, 0.1), Eigen::Vector3d(-1, -1, -1)}) {
+        const Eigen::Vector3d axis = way.normalized(), middle = centre + Eigen::Vector3d(10.3, 9.8, 10.1);
+        const Mask body = draw({55, 55, 55}, [=](const Eigen::Vector3d& p) {
+            const Eigen::Vector3d r = p - middle;
+            return r.norm() <= 24 && r.norm() > 14 && !(r.dot(axis) > 0 && r.cross(axis).norm() <= radius);
+        });
+        const std::vector<Void> voids = voids_of(body, 7.5);
+        ASSERT_EQ(voids.size(), 1U);
+        EXPECT_NEAR(voids[0].throat_diameter, 2.0 * radius, 0.5) << way.transpose();
+    }
+}
+
 TEST(Voids, of_a_pit_have_its_width_for_a_throat)
 {
     const double radius = 3.1;

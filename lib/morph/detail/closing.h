@@ -29,9 +29,14 @@ Closing roll_ball(const Mask& solid, double radius);
 /// Apparent shape in the padded box.
 std::vector<std::uint8_t> unreached(const Closing& closing);
 
-/// Throat transform: b(x) = max over paths from the reached outside to x of the least d on the path, of every void voxel the ball
-/// does not reach (0 elsewhere), by a bucket queue that starts at E.
-std::vector<float> bottlenecks(const Closing& closing);
+/// Throat transform, of every void voxel the ball does not reach.
+struct Bottlenecks {
+    std::vector<float> radius;          ///< b(x) = max over paths from the reached outside to x of the least d on the path; 0 elsewhere
+    std::vector<std::uint32_t> saddle;  ///< first voxel on that path where d is least
+};
+
+/// By a bucket queue that starts at E. \throws Error when the box has more than 2^32 voxels
+Bottlenecks bottlenecks(const Closing& closing);
 
 /// Whether a void widens by more than c behind its bottleneck.
 inline bool behind_constriction(float squared_distance, float bottleneck) { return std::sqrt(squared_distance) > bottleneck + 1.0F; }
@@ -47,8 +52,8 @@ struct VoidParts {
 VoidParts void_parts(const Closing& closing, const std::vector<std::uint8_t>& voids, std::vector<std::uint8_t> open);
 
 /// The parts that count, largest first (first voxel among equals).
-/// \param bottleneck  throat transform; may be empty when no void is open
+/// \param paths  throat transform; may be empty when no void is open
 std::vector<Void> describe_voids(const Closing& closing, const std::vector<std::uint8_t>& apparent, const VoidParts& parts,
-                                 const std::vector<float>& bottleneck);
+                                 const Bottlenecks& paths);
 
 }  // namespace coral::morph::detail
