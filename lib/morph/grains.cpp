@@ -7,6 +7,15 @@
 namespace coral::morph {
 namespace {
 
+/// Whether two rows hold different labels side by side. Without branches, many voxels at a time: most rows hold none.
+template <class T>
+bool any_touch(const T* row, const T* other, int begin, int end)
+{
+    unsigned any = 0;
+    for (int i = begin; i < end; ++i) any |= unsigned(row[i] != other[i]) & unsigned(row[i] != 0) & unsigned(other[i] != 0);
+    return any != 0;
+}
+
 /// Labels with a neighbour of another label. Thirteen offsets see every pair of the 26-neighbourhood once.
 template <class T>
 std::unordered_set<std::uint32_t> touching_labels(std::span<const T> labels, const Eigen::Vector3i& size)
@@ -21,7 +30,9 @@ std::unordered_set<std::uint32_t> touching_labels(std::span<const T> labels, con
                 if (j + dj < 0 || j + dj >= size.y() || k + dk >= size.z()) continue;
                 const T* row = labels.data() + dz * k + dy * j;
                 const T* other = row + di + dy * dj + dz * dk;
-                for (int i = std::max(0, -di); i < size.x() - std::max(0, di); ++i) {
+                const int begin = std::max(0, -di), end = size.x() - std::max(0, di);
+                if (!any_touch(row, other, begin, end)) continue;
+                for (int i = begin; i < end; ++i) {
                     if (row[i] == other[i] || row[i] == 0 || other[i] == 0 || (row[i] == last_a && other[i] == last_b)) continue;
                     last_a = row[i];
                     last_b = other[i];
