@@ -63,6 +63,7 @@ struct Fitted {
     double outer_excess = 0.0, seconds = 0.0;
     bool centre_inside = true, met = true;
     std::string refusal;  ///< why the grain must not be fitted; empty when it may
+    bool has_surface = false;  ///< false: not even --force has anything to give
 };
 
 std::string why_refused(const sh::RadialSamples& samples)
@@ -90,8 +91,10 @@ Fitted fit_grain(const sdf::GrainLevelSet& grain, const Options& o)
     f.shape.errors.non_star_fraction = samples.non_star_fraction;
     f.centre_inside = samples.centre_inside;
     if (!f.refusal.empty() && !o.force) return f;
-    if (std::ranges::find(samples.radii, 0.0) != samples.radii.end())
-        throw Error(fmt::format("grain {}", grain.id), "some directions from its centroid miss it: no radius describes it", "--skip leaves it out");
+    if (std::ranges::find(samples.radii, 0.0) != samples.radii.end()) {
+        f.refusal = "some directions from its centroid miss it";
+        return f;
+    }
     const sh::FitReference reference(grain.apparent);
     f.outer_excess = samples.outer_volume / reference.volume() - 1.0;
     // Low degrees of a long grain can have no positive radius: no surface, and no reason to stop the others.
@@ -101,9 +104,6 @@ Fitted fit_grain(const sdf::GrainLevelSet& grain, const Options& o)
         const bool is_surface = sh::body_properties(f.shape.surface).smallest_radius > 0;
         f.shape.errors = is_surface ? reference.errors(f.shape.surface, samples) : no_errors(samples.non_star_fraction);
         return is_surface;
-    };
-    const auto refuse_degree = [&](int degree) {
-        throw Error(fmt::format("grain {}", grain.id), fmt::format("degree {} gives a radius that is not positive", degree), "take another degree, or --skip leaves it out");
     };
     if (o.tolerance > 0 || !o.convergence.empty()) {
         std::optional<sh::ShapeRecord> chosen;
@@ -115,10 +115,14 @@ Fitted fit_grain(const sdf::GrainLevelSet& grain, const Options& o)
             if (chosen && o.convergence.empty()) break;
         }
         if (chosen) f.shape = *chosen;
-        else if (!is_surface) refuse_degree(bound);
+        f.has_surface = chosen || is_surface;
         f.met = chosen || o.tolerance <= 0;
-    } else if (!evaluate(o.degree)) {
-        refuse_degree(o.degree);
+    } else {
+        f.has_surface = evaluate(o.degree);
+    }
+    if (!f.has_surface) {
+        f.refusal = fmt::format("degree {} gives a radius that is not positive", bound);
+        return f;
     }
     f.shape.volume = sh::body_properties(f.shape.surface).volume;
     f.shape.solid_volume = grain.volume;
@@ -147,20 +151,23 @@ std::vector<Fitted> fit_all(const sdf::GrainReader& reader, const Options& o)
 /// Warns of shapes that harmonics hold badly; takes refused grains out or stops. Returns how many were taken out.
 std::size_t sort_out(std::vector<Fitted>& fitted, const Options& o)
 {
+    constexpr std::size_t listed = 5;
     std::string refused;
+    std::size_t count = 0;
     for (const Fitted& f : fitted) {
         if (!f.refusal.empty()) {
-            if (o.force) spdlog::warn("grain {}: {}; fitted by its outer envelope, volume {:+.1f} % before scaling", f.shape.id, f.refusal, 100 * f.outer_excess);
+            if (o.force && f.has_surface) spdlog::warn("grain {}: {}; fitted by its outer envelope, volume {:+.1f} % before scaling", f.shape.id, f.refusal, 100 * f.outer_excess);
             else if (o.skip) spdlog::warn("grain {}: {}; left out", f.shape.id, f.refusal);
-            else refused += fmt::format("{}grain {}: {}", refused.empty() ? "" : "; ", f.shape.id, f.refusal);
+            else if (++count <= listed) refused += fmt::format("{}grain {}: {}", refused.empty() ? "" : "; ", f.shape.id, f.refusal);
             continue;
         }
         if (f.shape.errors.non_star_fraction > sh::non_star_warning)
             spdlog::warn("grain {}: {:.1f} % of the directions cross its surface more than once; the outermost crossing is fitted", f.shape.id, 100 * f.shape.errors.non_star_fraction);
         if (!f.met) spdlog::warn("grain {}: RMS error {:.2f} % at degree {}, above the tolerance", f.shape.id, 100 * f.shape.errors.rms_error, f.shape.surface.degree);
     }
-    if (!refused.empty())
-        throw Error(o.input.filename().string(), "not star-shaped: " + refused, "no radius about one centre describes them: keep the level set, or --skip leaves them out, or --force fits the outer envelope");
+    if (count > 0)
+        throw Error(o.input.filename().string(), fmt::format("not star-shaped: {}{}", refused, count > listed ? fmt::format(" and {} more", count - listed) : ""),
+                    "no radius about one centre describes them: keep the level set, or take another degree, or --skip leaves them out, or --force fits the outer envelope where there is one");
     if (o.force) return 0;
     return std::erase_if(fitted, [](const Fitted& f) { return !f.refusal.empty(); });
 }

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <functional>
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <random>
@@ -87,23 +88,27 @@ TEST(Ls2shAccuracy, gives_analytic_coefficients_back_and_scales_volume_exactly)
     EXPECT_NEAR(sh::body_properties(sh::fit(samples, 8, 3.7)).volume / 3.7, 1.0, 1e-6);
 }
 
-/// A ball with a deep slot, a C from the side: not star-shaped, yet no direction misses it.
-sdf::GrainLevelSet bent_grain()
+/// Grain of the voxels about the origin, n per axis, that are `solid`.
+sdf::GrainLevelSet drawn_grain(int id, int n, const std::function<bool(const Eigen::Vector3d&)>& solid)
 {
-    const int n = 60;
     const double voxel = 1e-4;
     std::vector<std::uint8_t> voxels;
     for (int k = 0; k < n; ++k)
         for (int j = 0; j < n; ++j)
-            for (int i = 0; i < n; ++i) {
-                const Eigen::Vector3d x = Eigen::Vector3d(i, j, k) - Eigen::Vector3d::Constant(0.5 * n);
-                const bool ball = x.norm() < 22, slot = std::abs(x.z() - 6) < 3 && x.x() > -12;
-                voxels.push_back(ball && !slot);
-            }
+            for (int i = 0; i < n; ++i) voxels.push_back(solid(Eigen::Vector3d(i, j, k) - Eigen::Vector3d::Constant(0.5 * n)));
     const sdf::GrainMask mask{Eigen::Vector3i::Constant(n), Eigen::Vector3d::Constant(voxel), Eigen::Vector3d::Zero(), voxels};
     sdf::GrainLevelSet grain = sdf::grain_from_masks(mask, mask, {.spacing = 1.5 * voxel});
-    grain.id = grain.label = 1;
+    grain.id = grain.label = id;
     return grain;
+}
+
+/// A ball with a deep slot, a C from the side: not star-shaped, yet no direction misses it.
+sdf::GrainLevelSet bent_grain()
+{
+    return drawn_grain(1, 60, [](const Eigen::Vector3d& x) {
+        const bool slot = std::abs(x.z() - 6) < 3 && x.x() > -12;
+        return x.norm() < 22 && !slot;
+    });
 }
 
 double number(const Table& table, const std::string& column)
@@ -141,6 +146,24 @@ TEST(Ls2shForced, marks_the_shape_and_tells_its_true_errors)
     EXPECT_GT(number(table, "inertia_error"), 0.005);
     EXPECT_NEAR(number(table, "outer_volume_excess"), number(table, "volume_error"), 0.02);
     EXPECT_EQ(read_table(folder.path() / "c.csv").rows.size(), 7u) << "every degree from 2 to 8";
+}
+
+TEST(Ls2shForced, cannot_make_a_surface_where_the_radius_is_not_positive)
+{
+    const ScratchFolder folder;
+    const sdf::GrainLevelSet rod = drawn_grain(1, 100, [](const Eigen::Vector3d& x) { return std::abs(x.z()) < 46 && std::hypot(x.x(), x.y()) < 5; });
+    const sdf::GrainLevelSet ball = drawn_grain(2, 40, [](const Eigen::Vector3d& x) { return x.norm() < 15; });
+    sdf::write_grains(folder.path() / "grains.vdb", std::vector{rod, ball}, {{"csct2ls", "0.1.0", {}, {"stack.tif"}}});
+    for (const char* option : {"", " --force"}) {
+        const ProgramResult refused = run_program(std::string("ls2sh grains.vdb -o g.sh.h5 --degree 4") + option, folder.path());
+        EXPECT_EQ(refused.exit_code, 1) << option;
+        EXPECT_NE(refused.err.find("grain 1: degree 4 gives a radius that is not positive"), std::string::npos) << refused.err;
+        EXPECT_FALSE(std::filesystem::exists(folder.path() / "g.sh.h5"));
+    }
+    const ProgramResult skipped = run_program("ls2sh grains.vdb -o g.sh.h5 --degree 4 --skip --json --quiet", folder.path());
+    ASSERT_EQ(skipped.exit_code, 0) << skipped.err;
+    EXPECT_EQ(nlohmann::json::parse(skipped.out)["left_out"], 1);
+    EXPECT_EQ(sh::read_shapes(folder.path() / "g.sh.h5").shapes.at(0).id, 2);
 }
 
 TEST(Ls2shAccuracy, fits_a_file_of_many_grains_alike)
