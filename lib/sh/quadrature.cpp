@@ -1,5 +1,6 @@
 #include "sh/quadrature.h"
 
+#include <algorithm>
 #include <cassert>
 #include <cmath>
 #include <numbers>
@@ -63,5 +64,17 @@ std::vector<double> analyse(const SphereQuadrature& quadrature, std::span<const 
     }
     return coefficients;
 }
+
+std::vector<Eigen::Vector3d> spread_directions(int count)
+{
+    std::vector<Eigen::Vector3d> directions;
+    for (int i = 0; i < count; ++i) {
+        const double z = 1.0 - (2.0 * i + 1.0) / count, phi = i * std::numbers::pi * (3.0 - std::sqrt(5.0)), s = std::sqrt(1.0 - z * z);
+        directions.emplace_back(s * std::cos(phi), s * std::sin(phi), z);
+    }
+    return directions;
+}
+
+int spread_count(int degree) { return std::max(12 * (degree + 1) * (degree + 1), 200); }
 
 }  // namespace coral::sh

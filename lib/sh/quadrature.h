@@ -17,6 +17,11 @@ SphereQuadrature sphere_quadrature(int polar, int azimuth);
 /// 4(degree+1) x 8(degree+1) directions: surfaces are not band-limited, so radii are over-sampled four times.
 SphereQuadrature oversampled_quadrature(int degree);
 
+/// Directions spread evenly over the sphere by the golden angle, in order of falling z.
+std::vector<Eigen::Vector3d> spread_directions(int count);
+/// As many as show every bump of a surface of the degree: 12 (degree+1)^2, at least 200.
+int spread_count(int degree);
+
 /// Nodes (rising) and weights of n-point Gauss-Legendre on [-1, 1], to machine accuracy.
 void gauss_legendre(int n, std::vector<double>& nodes, std::vector<double>& weights);
 

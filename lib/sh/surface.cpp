@@ -65,6 +65,7 @@ BodyProperties body_properties(const Surface& surface)
         body.smallest_radius = std::min(body.smallest_radius, r);
         body.largest_radius = std::max(body.largest_radius, r);
     }
+    for (const Eigen::Vector3d& u : spread_directions(spread_count(surface.degree))) body.smallest_radius = std::min(body.smallest_radius, evaluator.radius(u));
     if (body.volume == 0) return body;
     const Eigen::Vector3d c = first / body.volume;  // from the centre
     second -= body.volume * c * c.transpose();

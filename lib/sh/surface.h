@@ -52,7 +52,7 @@ struct BodyProperties {
     double area = 0.0;                                   ///< integral r sqrt(r^2 + |grad r|^2) [m^2]
     Eigen::Vector3d centroid = Eigen::Vector3d::Zero();  ///< in the grain's frame [m]
     Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();   ///< about the centroid [m^5]
-    double smallest_radius = 0.0, largest_radius = 0.0;  ///< over the quadrature [m]; smallest <= 0: not a surface
+    double smallest_radius = 0.0, largest_radius = 0.0;  ///< over the quadrature, the smallest also over spread_directions [m]; <= 0: not a surface
 };
 BodyProperties body_properties(const Surface& surface);
 

@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "core/error.h"
+#include "sh/quadrature.h"
 
 namespace coral::sh {
 namespace {
@@ -12,17 +13,6 @@ namespace {
 constexpr Eigen::Index block = 64;       // samples scanned at once
 constexpr std::size_t most_starts = 12;  // near the centre of a ball every sample is as near as the next
 constexpr int most_steps = 40;
-
-/// Points spread evenly over the unit sphere by the golden angle.
-std::vector<Eigen::Vector3d> spread_directions(int count)
-{
-    std::vector<Eigen::Vector3d> directions;
-    for (int i = 0; i < count; ++i) {
-        const double z = 1.0 - (2.0 * i + 1.0) / count, phi = i * std::numbers::pi * (3.0 - std::sqrt(5.0)), s = std::sqrt(1.0 - z * z);
-        directions.emplace_back(s * std::cos(phi), s * std::sin(phi), z);
-    }
-    return directions;
-}
 
 /// The directions lie in order of falling z: those within an angle of u are in a band.
 template <class Take>
@@ -68,7 +58,7 @@ Eigen::Vector2d newton_step(const Eigen::Matrix2d& H, const Eigen::Vector2d& g)
 
 SurfaceDistance::SurfaceDistance(const Surface& surface, int samples) : evaluator_(surface)
 {
-    const int degree = surface.degree, count = samples > 0 ? std::max(samples, 32) : std::max(12 * (degree + 1) * (degree + 1), 200);
+    const int degree = surface.degree, count = samples > 0 ? std::max(samples, 32) : spread_count(degree);
     directions_ = spread_directions(count);
     const Eigen::Index padded = (count + block - 1) / block * block;
     px_ = py_ = pz_ = Eigen::ArrayXf::Constant(padded, 1e18f);

@@ -151,16 +151,16 @@ TEST(Ls2shForced, marks_the_shape_and_tells_its_true_errors)
 TEST(Ls2shForced, cannot_make_a_surface_where_the_radius_is_not_positive)
 {
     const ScratchFolder folder;
-    const sdf::GrainLevelSet rod = drawn_grain(1, 100, [](const Eigen::Vector3d& x) { return std::abs(x.z()) < 46 && std::hypot(x.x(), x.y()) < 5; });
+    const sdf::GrainLevelSet plate = drawn_grain(1, 100, [](const Eigen::Vector3d& x) { return std::abs(x.z()) < 3 && std::hypot(x.x(), x.y()) < 45; });
     const sdf::GrainLevelSet ball = drawn_grain(2, 40, [](const Eigen::Vector3d& x) { return x.norm() < 15; });
-    sdf::write_grains(folder.path() / "grains.vdb", std::vector{rod, ball}, {{"csct2ls", "0.1.0", {}, {"stack.tif"}}});
+    sdf::write_grains(folder.path() / "grains.vdb", std::vector{plate, ball}, {{"csct2ls", "0.1.0", {}, {"stack.tif"}}});
     for (const char* option : {"", " --force"}) {
-        const ProgramResult refused = run_program(std::string("ls2sh grains.vdb -o g.sh.h5 --degree 4") + option, folder.path());
+        const ProgramResult refused = run_program(std::string("ls2sh grains.vdb -o g.sh.h5 --degree 8") + option, folder.path());
         EXPECT_EQ(refused.exit_code, 1) << option;
-        EXPECT_NE(refused.err.find("grain 1: degree 4 gives a radius that is not positive"), std::string::npos) << refused.err;
+        EXPECT_NE(refused.err.find("grain 1: degree 8 gives a radius that is not positive"), std::string::npos) << refused.err;
         EXPECT_FALSE(std::filesystem::exists(folder.path() / "g.sh.h5"));
     }
-    const ProgramResult skipped = run_program("ls2sh grains.vdb -o g.sh.h5 --degree 4 --skip --json --quiet", folder.path());
+    const ProgramResult skipped = run_program("ls2sh grains.vdb -o g.sh.h5 --degree 8 --skip --json --quiet", folder.path());
     ASSERT_EQ(skipped.exit_code, 0) << skipped.err;
     EXPECT_EQ(nlohmann::json::parse(skipped.out)["left_out"], 1);
     EXPECT_EQ(sh::read_shapes(folder.path() / "g.sh.h5").shapes.at(0).id, 2);
