@@ -98,15 +98,16 @@ struct Fitted {
 /// \param farthest  from the start
 Fitted fit_across(const Room& room, const Eigen::Vector3d& start, double c, double farthest)
 {
+    constexpr double d = std::numbers::sqrt2 / 2;
+    constexpr std::array<std::array<double, 2>, 8> around{{{1, 0}, {d, d}, {0, 1}, {-d, d}, {-1, 0}, {-d, -d}, {0, -1}, {d, -d}}};
     Fitted ball{start, room.radius(start), Eigen::Vector3d::UnitX()};
     for (double step = 0.4 * c; step > 0.01 * c; step *= 0.5) {
         ball.axis = room.along(ball.centre, ball.radius, c);
         const Eigen::Vector3d u = ball.axis.unitOrthogonal(), v = ball.axis.cross(u);
         for (bool wider = true; wider;) {
             wider = false;
-            for (int n = 0; n < 8; ++n) {
-                const double angle = 0.25 * std::numbers::pi * n;
-                const Eigen::Vector3d trial = ball.centre + step * (std::cos(angle) * u + std::sin(angle) * v);
+            for (const auto& [along_u, along_v] : around) {
+                const Eigen::Vector3d trial = ball.centre + step * (along_u * u + along_v * v);
                 if ((trial - start).norm() > farthest) continue;
                 if (const double r = room.radius(trial); r > ball.radius) {
                     ball.radius = r;
