@@ -1,6 +1,7 @@
 #include "pack/criteria.h"
 
 #include <algorithm>
+#include <array>
 #include <cassert>
 #include <cmath>
 #include <limits>
@@ -105,7 +106,34 @@ double kenney_lau_ratio(const Psd& psd, double highest_f)
 
 double mao_number(double fines_content, double porosity) { return 4 * fines_content * (1 - porosity); }
 
-std::vector<Criterion> stability_criteria(const Psd& psd, double fines_content, double porosity)
+double burenkova_distance(const Psd& psd)
+{
+    const double d90 = size_at(psd, 0.90), width = std::log10(d90 / size_at(psd, 0.15));
+    constexpr double lower = 0.76, upper = 1.86;
+    return width > 0 ? std::abs((d90 / size_at(psd, 0.60) - 1) / width - 0.5 * (lower + upper)) / (0.5 * (upper - lower)) : not_a_number;
+}
+
+double fines_stress_ratio(const Sample& sample)
+{
+    std::array<double, 2> stress{}, space{};  // of each role: sum of p V [J] and of V [m3]
+    for (const Particle& p : sample.particles) space[std::size_t(p.role)] += apparent_volume(sample, p);
+    const auto press = [&](std::int32_t body, const Eigen::Vector3d& force, const Eigen::Vector3d& point) {
+        const Particle& p = sample.particles[std::size_t(body)];
+        stress[std::size_t(p.role)] -= force.dot(point - p.position) / 3;
+    };
+    for (const Contact& c : sample.contacts) {
+        const Eigen::Vector3d force = c.normal_force + c.tangential_force;
+        press(c.first, force, c.point);
+        if (c.second >= 0) press(c.second, -force, c.point);
+    }
+    const auto fine = std::size_t(Role::fine), coarse = std::size_t(Role::coarse);
+    if (!(space[fine] > 0 && space[coarse] > 0 && stress[fine] + stress[coarse] > 0)) return not_a_number;
+    return (stress[fine] / space[fine]) * ((space[fine] + space[coarse]) / (stress[fine] + stress[coarse]));
+}
+
+double relative_density(double void_ratio, double e_min, double e_max) { return (e_max - void_ratio) / (e_max - e_min); }
+
+std::vector<Criterion> stability_criteria(const Psd& psd, double fines_content, double porosity, double stress_ratio)
 {
     const bool two_fractions = fines_content > 0 && fines_content < 1;
     double highest_f = uniformity(two_fractions ? between(psd, fines_content, 1) : psd) <= 3 ? 0.3 : 0.2;
@@ -120,6 +148,10 @@ std::vector<Criterion> stability_criteria(const Psd& psd, double fines_content, 
         judged("mao", two_fractions ? mao_number(fines_content, porosity) : not_a_number, 1, true,
                "4 Fc (1 - n), n with intraparticle voids, stable if >= 1 [Mao 2005]"),
         judged("istomina", uniformity(psd), 10, false, "D60/D10, stable if <= 10, unstable for certain above 20 [Istomina 1957]"),
+        judged("burenkova", burenkova_distance(psd), 1, false,
+               "|k - 1.31|/0.55, k = (d90/d60 - 1)/lg(d90/d15), stable if < 1, that is 0.76 < k < 1.86 [Burenkova 1993]"),
+        judged("skempton-brogan", stress_ratio, 0.5, true,
+               "alpha, mean stress of the fines over that of all grains, stable if >= 0.5 (a limit of ours) [Skempton and Brogan 1994, Shire et al. 2014]"),
     };
 }
 

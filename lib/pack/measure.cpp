@@ -109,7 +109,7 @@ void measure(const dem::World& world, const Box& box, const MotionWindow::Means&
         masses.push_back(mass(sample, p));
     }
     sample.psd = gradation(diameters, masses);
-    sample.criteria = stability_criteria(sample.psd, s.fines_content, s.porosity);
+    sample.criteria = stability_criteria(sample.psd, s.fines_content, s.porosity, fines_stress_ratio(sample));
 }
 
 }  // namespace coral::pack::detail

@@ -109,3 +109,86 @@ TEST(StabilityCriteria, find_the_least_kenney_lau_ratio_that_brute_force_finds)
         EXPECT_NEAR(kenney_lau_ratio(psd, 0.3), least, 2e-3 * (1 + least)) << trial;
     }
 }
+
+// h' = d90/d60 and h'' = d90/d15 straight from the points: k = 1/lg 10 = 1 inside the band, 2 above it, 0.5 below it.
+TEST(StabilityCriteria, give_burenkova_as_the_distance_from_the_middle_of_its_band)
+{
+    const auto of = [](double d15, double d60, double d90) { return Psd{{0.5, 0}, {d15, 0.15}, {d60, 0.60}, {d90, 0.90}, {100, 1}}; };
+    EXPECT_NEAR(burenkova_distance(of(1, 5, 10)), 0.31 / 0.55, 1e-12);
+    EXPECT_NEAR(burenkova_distance(of(1, 10.0 / 3, 10)), 0.69 / 0.55, 1e-12);
+    EXPECT_NEAR(burenkova_distance(of(1, 10 / 1.5, 10)), 0.81 / 0.55, 1e-12);
+    EXPECT_NEAR(burenkova_distance(of(1, 10 / 1.76, 10)), 1, 1e-12);  // h' = 0.76 lg h'' + 1
+    EXPECT_NEAR(burenkova_distance(of(1, 10 / 2.86, 10)), 1, 1e-12);  // h' = 1.86 lg h'' + 1
+    EXPECT_EQ(named(stability_criteria(of(1, 5, 10), 0, 0.4), "burenkova").verdict, "stable");
+    EXPECT_EQ(named(stability_criteria(of(1, 10.0 / 3, 10), 0, 0.4), "burenkova").verdict, "unstable");
+    EXPECT_EQ(named(stability_criteria({{2, 0}, {2, 1}}, 0, 0.4), "burenkova").verdict, "not applicable");
+    EXPECT_NEAR(burenkova_distance(paper_gradation()), 1.31 / 0.55, 1e-12);  // h' = 1: the coarse grains have one size
+}
+
+namespace {
+
+/// A coarse sphere of 2 m between two walls along x, pressed with 30 N, and a fine one of 1 m on top of it (0, 0, 1.5), pressed down by a wall with 6 N.
+Sample pressed_pair()
+{
+    Sample s;
+    s.shapes = {unit_sphere()};
+    s.materials = {{}};
+    s.particles.resize(2);
+    s.particles[0].scale = 2;
+    s.particles[1].scale = 1;
+    s.particles[1].role = Role::fine;
+    s.particles[1].position = {0, 0, 1.5};
+    const auto contact = [](int first, int second, const Eigen::Vector3d& point, const Eigen::Vector3d& force) {
+        Contact c;
+        c.first = first;
+        c.second = second;
+        c.point = point;
+        c.normal_force = force;
+        return c;
+    };
+    s.contacts = {contact(0, -1, {-1, 0, 0}, {30, 0, 0}), contact(0, -2, {1, 0, 0}, {-30, 0, 0}), contact(0, 1, {0, 0, 1}, {0, 0, -6}),
+                  contact(1, -6, {0, 0, 2}, {0, 0, -6}), contact(0, -5, {0, 0, -1}, {0, 0, 6})};
+    return s;
+}
+
+}  // namespace
+
+// By hand: the fine grain has p V = (6 x 0.5 + 6 x 0.5)/3 = 2 J, the coarse one (30 + 30 + 6 + 6)/3 = 24 J; volumes are as 1 : 8, so
+// alpha = (2/1) / (26/9) = 9/13.
+TEST(StabilityCriteria, give_the_stress_of_the_fines_from_contact_forces)
+{
+    Sample s = pressed_pair();
+    EXPECT_NEAR(fines_stress_ratio(s), 9.0 / 13, 1e-14);
+    const Criterion c = named(stability_criteria(paper_gradation(), 0.3, 0.5, fines_stress_ratio(s)), "skempton-brogan");
+    EXPECT_EQ(c.verdict, "stable");
+    EXPECT_NE(c.definition.find("Skempton and Brogan 1994"), std::string::npos);
+    for (int k : {2, 3}) s.contacts[std::size_t(k)].normal_force *= 0.5;  // p V of the fine one 1 J, of the coarse one 23 J: 9/24
+    EXPECT_NEAR(fines_stress_ratio(s), 9.0 / 24, 1e-14);
+    EXPECT_EQ(named(stability_criteria(paper_gradation(), 0.3, 0.5, fines_stress_ratio(s)), "skempton-brogan").verdict, "unstable");
+}
+
+TEST(StabilityCriteria, count_a_tangential_force_in_the_stress_only_as_far_as_it_presses)
+{
+    Sample s = pressed_pair();
+    for (Contact& c : s.contacts) c.tangential_force = {0, 5, 0};  // at right angles to every branch vector
+    EXPECT_NEAR(fines_stress_ratio(s), 9.0 / 13, 1e-14);
+}
+
+TEST(StabilityCriteria, have_no_stress_of_the_fines_without_contacts_or_without_fines)
+{
+    Sample s = pressed_pair();
+    s.particles[1].role = Role::coarse;
+    EXPECT_TRUE(std::isnan(fines_stress_ratio(s)));
+    s = pressed_pair();
+    s.contacts.clear();
+    EXPECT_TRUE(std::isnan(fines_stress_ratio(s)));
+    EXPECT_EQ(named(stability_criteria(paper_gradation(), 0.3, 0.5, fines_stress_ratio(s)), "skempton-brogan").verdict, "not applicable");
+}
+
+TEST(RelativeDensity, is_zero_at_the_loosest_and_one_at_the_densest_state)
+{
+    EXPECT_DOUBLE_EQ(relative_density(1.4, 0.8, 1.4), 0);
+    EXPECT_DOUBLE_EQ(relative_density(0.8, 0.8, 1.4), 1);
+    EXPECT_NEAR(relative_density(1.1, 0.8, 1.4), 0.5, 1e-15);
+    EXPECT_NEAR(relative_density(0.95, 0.8, 1.4), 0.75, 1e-15);
+}
