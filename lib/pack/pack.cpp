@@ -2,6 +2,8 @@
 
 #include <chrono>
 
+#include "core/text.h"
+#include "pack/criteria.h"
 #include "pack/detail/phases.h"
 #include "pack/sample_world.h"
 
@@ -47,6 +49,11 @@ Sample pack(const Spec& spec, std::uint64_t seed, PackReport& report)
         report.warnings.push_back(std::to_string(report.unsettled_layers) + " of " + std::to_string(report.layers) +
                                   " batches hit [dropping] time_limit before they had settled");
     detail::measure(world, box, rest, spec.dem_step > 0 ? spec.dem_step : world.auto_time_step(), report.steps, sample);
+    if (spec.density) {
+        report.relative_density = relative_density(sample.statistics.void_ratio, spec.density->e_min, spec.density->e_max);
+        if (report.relative_density < 0 || report.relative_density > 1)
+            report.warnings.push_back("relative density " + to_text(100 * report.relative_density) + " %: the void ratio lies outside [density] e_min and e_max");
+    }
     return std::move(sample);
 }
 

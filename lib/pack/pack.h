@@ -2,6 +2,7 @@
 /// \file pack/pack.h
 /// The whole packing: grains drawn, poured in alternating layers, compressed, relaxed and measured.
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -18,6 +19,7 @@ struct PackReport {
     bool relaxed = true;        ///< whether the final relaxation met its limits
     std::int64_t steps = 0;     ///< of all phases
     double pouring_seconds = 0, compression_seconds = 0, relaxation_seconds = 0, loading_seconds = 0;  ///< wall time
+    double relative_density = std::numeric_limits<double>::quiet_NaN();  ///< of the void ratio, voids included [-]; NaN without [density]
     double simulated_time = 0;  ///< of all phases [s]
     std::vector<std::string> warnings;
 };

@@ -12,6 +12,8 @@
 #include "core/parallel.h"
 #include "core/progress.h"
 #include "core/units.h"
+#include "dem/polyhedron.h"
+#include "dem/superellipsoid.h"
 #include "pack/criteria.h"
 #include "sdf/extend.h"
 #include "sdf/mass_properties.h"
@@ -34,6 +36,8 @@ struct Source {
     History history;
 };
 
+dem::Superellipsoid superellipsoid(const Population& p) { return {p.radii, p.exponents[0], p.exponents[1]}; }
+
 Source read_source(const Population& p)
 {
     Source source;
@@ -47,19 +51,30 @@ Source read_source(const Population& p)
             source.diameter[id] = grain.equivalent_diameter;
             source.volume[id] = grain.volume;
         }
+    } else if (p.shape == ShapeKind::polyhedron) {
+        for (std::size_t i = 0; i < p.polyhedra.size(); ++i) {
+            source.ids.push_back(std::int64_t(i));
+            source.volume[std::int64_t(i)] = dem::Polyhedron(p.polyhedra[i].points, p.polyhedra[i].name).volume();
+        }
+    } else if (p.shape == ShapeKind::superellipsoid) {
+        source.ids = {0};
+        source.volume[0] = dem::volume(superellipsoid(p));
     } else {
         const sh::ShapeFile file = sh::read_shapes(p.file);
         source.history = file.history;
         for (const sh::ShapeRecord& s : file.shapes) {
             source.ids.push_back(s.id);
             source.volume[s.id] = s.volume;
-            source.diameter[s.id] = std::cbrt(6 * s.volume / std::numbers::pi);
         }
     }
+    for (const auto& [id, volume] : source.volume) source.diameter.try_emplace(id, std::cbrt(6 * volume / std::numbers::pi));
     for (const std::int64_t id : p.grains)
-        if (!source.volume.contains(id)) throw UsageError(p.file.string(), "population '" + p.name + "' asks for grain " + std::to_string(id) + ", which the file does not have", "write grains = \"all\" or ids of the file's table");
+        if (!source.volume.contains(id)) throw UsageError(p.location, "population '" + p.name + "' asks for grain " + std::to_string(id) + ", which " + p.file.filename().string() + " does not have", "write grains = \"all\" or ids of the file's table");
     if (!p.grains.empty()) source.ids = p.grains;
     if (source.ids.empty()) throw Error(p.file.string(), "has no grains", "make it again with csct2ls");
+    for (const std::int64_t id : source.ids)
+        if (!(source.volume.at(id) > 0 && source.diameter.at(id) > 0))
+            throw UsageError(p.location, "grain " + std::to_string(id) + " of " + p.file.filename().string() + " has no volume", "leave it out of grains, or make the file again");
     return source;
 }
 
@@ -87,7 +102,7 @@ public:
         }
         const std::int64_t id = deck_.back();
         deck_.pop_back();
-        const double own = source_.diameter.at(id), d = p_.own_size ? own : diameter();
+        const double own = source_.diameter.at(id), d = p_.own_size ? p_.scale * own : diameter();
         return {id, d, density_ * source_.volume.at(id) * std::pow(d / own, 3)};
     }
     const Source& source() const { return source_; }
@@ -124,7 +139,7 @@ Drawn draw_mass(Drawer& drawer, double target, const Population& p)
     Drawn grains;
     double sum = 0;
     while (sum < target) {
-        if (grains.size() > 5'000'000) throw UsageError("population '" + p.name + "'", "its mass fraction takes more than five million grains", "enlarge its diameters");
+        if (grains.size() > 5'000'000) throw UsageError(p.location, "the mass fraction of population '" + p.name + "' takes more than five million grains", "enlarge its diameters");
         grains.push_back(drawer.next());
         sum += grains.back().mass;
     }
@@ -168,14 +183,47 @@ void check_room(const Spec& spec, const Grains& grains)
     for (const Particle& p : grains.sample.particles) apparent += apparent_volume(grains.sample, p);
     const double box = spec.size.prod();
     if (apparent > 0.74 * box)
-        throw UsageError("[box] size", "the grains fill " + std::to_string(int(100 * apparent / box)) + " % of the box, no packing holds more than 74 %",
+        throw UsageError(spec.box_location, "key 'box.size': the grains fill " + std::to_string(int(100 * apparent / box)) + " % of the box, no packing holds more than 74 %",
                          "enlarge the box or take fewer grains");
     for (std::size_t i = 0; i < grains.sample.particles.size(); ++i) {
         const Particle& p = grains.sample.particles[i];
         const double d = equivalent_diameter(grains.sample, p), base = spec.size.head<2>().minCoeff();
-        if (d >= base) throw UsageError("population '" + spec.populations[std::size_t(grains.population[i])].name + "'",
-                                        "a grain of " + format_quantity(d, Dimension::length) + " does not fit the base of the box, " + format_quantity(base, Dimension::length), "enlarge [box] size");
+        const Population& of = spec.populations[std::size_t(grains.population[i])];
+        if (d >= base) throw UsageError(of.location, "a grain of population '" + of.name + "', " + format_quantity(d, Dimension::length) + ", does not fit the base of the box, " + format_quantity(base, Dimension::length), "enlarge [box] size");
     }
+}
+
+ShapeTemplate polyhedron_template(const Corners& corners, int nodes)
+{
+    const dem::Polyhedron body(corners.points, corners.name);
+    ShapeTemplate shape;
+    shape.kind = ShapeKind::polyhedron;
+    shape.name = corners.name;
+    shape.vertices.assign(body.vertices().begin(), body.vertices().end());
+    shape.volume = shape.apparent_volume = body.volume();
+    shape.equivalent_diameter = std::cbrt(6 * body.volume() / std::numbers::pi);
+    shape.inertia = body.inertia();
+    dem::SurfaceNodes surface = dem::polyhedron_nodes(body, nodes);
+    shape.nodes = std::move(surface.positions);
+    shape.node_areas = std::move(surface.areas);
+    return shape;
+}
+
+ShapeTemplate superellipsoid_template(const Population& p, double reach)
+{
+    const auto body = dem::superellipsoid_shape(superellipsoid(p), reach, "superellipsoid", p.surface_nodes, p.grid_spacing);
+    ShapeTemplate shape;
+    shape.kind = ShapeKind::superellipsoid;
+    shape.name = body->name();
+    shape.radii = p.radii;
+    shape.exponents = p.exponents;
+    shape.volume = shape.apparent_volume = body->volume();
+    shape.equivalent_diameter = 2 * body->equivalent_radius();
+    shape.inertia = body->inertia();
+    shape.grid = std::make_shared<const sdf::DistanceGrid>(body->distance_grid());
+    shape.nodes.assign(body->nodes().begin(), body->nodes().end());
+    shape.node_areas.assign(body->node_areas().begin(), body->node_areas().end());
+    return shape;
 }
 
 }  // namespace
@@ -193,6 +241,10 @@ ShapeTemplate load_shape(const Population& p, std::int64_t id, double reach)
         shape.apparent_volume = grain.apparent_volume;
         shape.equivalent_diameter = grain.equivalent_diameter;
         shape.inertia = grain.inertia;
+    } else if (p.shape == ShapeKind::polyhedron) {
+        return polyhedron_template(p.polyhedra.at(std::size_t(id)), p.surface_nodes);
+    } else if (p.shape == ShapeKind::superellipsoid) {
+        return superellipsoid_template(p, reach);
     } else {
         const sh::ShapeFile file = sh::read_shapes(p.file);
         const auto found = std::find_if(file.shapes.begin(), file.shapes.end(), [&](const sh::ShapeRecord& s) { return s.id == id; });

@@ -18,11 +18,13 @@ struct Grains {
 /// Draws and loads everything. Ids are drawn evenly: every id once in random order, then again, until the population is full.
 /// A mass fraction is met to half a grain of the population. Grid shapes reach out to the largest sphere of the specification, its
 /// skin included, at the smallest scale they are used with.
-/// \throws UsageError  an id that the file does not have (with the ids it has)
+/// \throws UsageError  an id that the file does not have, a grain without volume, more grains than the box can hold; each with its place
+///                     in the specification
 /// \throws Error       a damaged file
 Grains make_grains(const Spec& spec, std::uint64_t seed);
 
-/// Template of a level-set grain of a .vdb file or of a harmonic shape. Lengths as in the file.
+/// Template of a level-set grain of a .vdb file, of a harmonic shape, of a polyhedron (`id` counts those of the population) or of a
+/// superellipsoid. Lengths as in the file.
 /// \param reach  distance outside the surface that contact queries [m]
 ShapeTemplate load_shape(const Population& population, std::int64_t id, double reach);
 

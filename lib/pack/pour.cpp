@@ -79,7 +79,7 @@ void place(const Batch& batch, Sample& sample, const std::vector<double>& radius
         const double r = radius[std::size_t(batch[n])];
         const Eigen::Array2d room = (spec.size.head<2>().array() - 2 * r).max(0.0);
         if (2 * r > spec.size.head<2>().minCoeff())
-            throw UsageError("[box] size", "a grain of bounding diameter " + to_text(2 * r) + " m does not fit between the walls", "enlarge the base of the box");
+            throw UsageError(spec.box_location, "key 'box.size': a grain of bounding diameter " + to_text(2 * r) + " m does not fit between the walls", "enlarge the base of the box");
         p.orientation = random_rotation(random);
         for (int attempt = 1;; ++attempt) {
             const double x = uniform(random), y = uniform(random), z = uniform(random);

@@ -8,6 +8,8 @@
 #include "core/config.h"
 #include "core/error.h"
 #include "core/text.h"
+#include "dem/polyhedron.h"
+#include "sdf/mesh_reader.h"
 
 namespace coral::pack {
 namespace {
@@ -66,6 +68,12 @@ void read_gradation_table(const ConfigTable& table, Population& p)
 void read_diameters(const ConfigTable& table, Population& p)
 {
     const int given = table.has("diameter") + table.has("diameters") + table.has("psd");
+    if (table.has("scale")) {
+        p.scale = table.quantity("scale", Dimension::number, 1.0);
+        require_positive(table, "scale", p.scale);
+        if (given > 0) table.error("scale", "stands beside a diameter", "scale multiplies the size of the shape, a diameter replaces it: keep one of them");
+        else if (p.shape == ShapeKind::sphere) table.error("scale", "means nothing for spheres", "write diameter");
+    }
     if (given > 1) table.error("diameter", "more than one of diameter, diameters and psd is given", "keep one of them");
     if (given == 0) {
         p.own_size = true;
@@ -85,13 +93,67 @@ void read_diameters(const ConfigTable& table, Population& p)
     }
 }
 
+/// Takes corners whose hull has a volume; tried at once, so that the error has its place.
+void take_corners(const ConfigTable& table, const char* key, Corners corners, Population& p)
+{
+    try {
+        dem::Polyhedron(corners.points, corners.name);
+        p.polyhedra.push_back(std::move(corners));
+    } catch (const Error& error) {
+        table.error(key, error.what());
+    }
+}
+
+/// The hull of `vertices`, or of each mesh of `file` (one name or a list).
+void read_polyhedra(const ConfigTable& table, const std::filesystem::path& folder, Population& p)
+{
+    static const std::array<std::string, 4> units{"m", "cm", "mm", "um"};
+    static constexpr std::array lengths{1.0, 1e-2, 1e-3, 1e-6};
+    if (table.has("file") == table.has("vertices")) {
+        table.error(table.has("file") ? "vertices" : "file", table.has("file") ? "stands beside file" : "is missing",
+                    "give file = \"stone.stl\" (or a list of files) and its unit, or vertices = [[x, y, z], ...]");
+        table.keys();
+        return;
+    }
+    if (table.has("vertices")) {
+        const auto vertices = table.vectors("vertices", Dimension::length);
+        if (!vertices.empty()) take_corners(table, "vertices", {"polyhedron", vertices}, p);
+        return;
+    }
+    const std::string unit = table.choice("unit", units);
+    const double length = lengths[std::size_t(std::find(units.begin(), units.end(), unit) - units.begin()) % units.size()];
+    const std::vector<std::string> names = table.is_array("file") ? table.strings("file") : std::vector{table.string("file")};
+    if (table.is_array("file") && names.empty()) table.error("file", "is an empty list", "write at least one mesh");
+    for (const std::string& name : names) {
+        const std::filesystem::path file = folder / name;
+        const std::string extension = file.extension().string();
+        if (extension != ".stl" && extension != ".ply") table.error("file", "'" + name + "' is no mesh that can be read", "take a .stl or .ply file");
+        else if (!std::filesystem::exists(file)) table.error("file", "'" + file.string() + "' does not exist", "paths are relative to the folder of this file");
+        else take_corners(table, "file", {file.filename().string(), sdf::read_mesh(file, length).vertices}, p);
+    }
+}
+
+void read_superellipsoid(const ConfigTable& table, Population& p)
+{
+    p.radii = table.vector("radii", Dimension::length);
+    if (table.has("radii") && !(p.radii.minCoeff() > 0)) table.error("radii", "has a radius that is not above zero", "give three, [a, b, c]");
+    const auto e = table.quantities("exponents", Dimension::number, std::vector<double>{1, 1});
+    if (e.size() != 2) return table.error("exponents", "has " + std::to_string(e.size()) + " values", "expected two, [e1, e2]");
+    for (const double value : e)
+        if (!(value > 0 && value <= 2))
+            table.error("exponents", "has " + to_text(value) + ", outside (0, 2]", "0.1 is nearly a box, 1 an ellipsoid, 2 an octahedron");
+    p.exponents = {e[0], e[1]};
+}
+
 void read_source(const ConfigTable& table, const std::filesystem::path& folder, const std::filesystem::path& grains, Population& p)
 {
     static const std::array<std::string, 5> shapes{"sphere", "level-set", "sh", "polyhedron", "superellipsoid"};
     const std::string shape = table.choice("shape", shapes, "sphere");
-    if (shape == "polyhedron" || shape == "superellipsoid")
-        table.error("shape", "'" + shape + "' is not supported yet", "use sphere, level-set or sh");
-    p.shape = shape == "level-set" ? ShapeKind::level_set : shape == "sh" ? ShapeKind::sh : ShapeKind::sphere;
+    for (const ShapeKind kind : {ShapeKind::level_set, ShapeKind::sh, ShapeKind::polyhedron, ShapeKind::superellipsoid})
+        if (shape == to_string(kind)) p.shape = kind;
+    p.location = table.location(table.has("file") ? "file" : "shape");
+    if (p.shape == ShapeKind::polyhedron) return read_polyhedra(table, folder, p);
+    if (p.shape == ShapeKind::superellipsoid) return read_superellipsoid(table, p);
     std::string file = table.string("file", "");
     if (p.shape == ShapeKind::sphere) {
         for (const char* key : {"file", "grains"})
@@ -127,7 +189,7 @@ Population read_population(const ConfigTable& table, const std::filesystem::path
     if (p.count && *p.count <= 0) table.error("count", "must be at least 1, is " + std::to_string(*p.count));
     if (p.mass_fraction) require_share(table, "mass_fraction", *p.mass_fraction, false);
     p.material = table.string("material", "default");
-    p.surface_nodes = static_cast<int>(table.integer("surface_nodes", p.shape == ShapeKind::sh ? 2500 : 6000));
+    p.surface_nodes = static_cast<int>(table.integer("surface_nodes", p.shape == ShapeKind::level_set ? 6000 : 2500));
     if (p.surface_nodes < 100) table.error("surface_nodes", "must be at least 100");
     p.grid_spacing = table.quantity("grid_spacing", Dimension::length, 0.0);
     if (p.grid_spacing < 0) table.error("grid_spacing", "is negative");
@@ -194,6 +256,17 @@ Compression read_compression(const ConfigTable& table)
     return c;
 }
 
+std::optional<DensityLimits> read_density(const ConfigTable& table)
+{
+    if (!table.has("e_min") && !table.has("e_max")) return {};
+    const DensityLimits limits{table.quantity("e_min", Dimension::number), table.quantity("e_max", Dimension::number)};
+    if (!table.has("e_min") || !table.has("e_max")) return {};
+    require_positive(table, "e_min", limits.e_min);
+    if (!(limits.e_max > limits.e_min))
+        table.error("e_max", "is " + to_text(limits.e_max) + ", not above e_min of " + to_text(limits.e_min), "e_max is the void ratio of the loosest state");
+    return limits;
+}
+
 void check_together(const std::vector<ConfigTable>& tables, const ConfigTable& root, Spec& spec)
 {
     std::vector<std::string> names;
@@ -209,7 +282,7 @@ void check_together(const std::vector<ConfigTable>& tables, const ConfigTable& r
             tables[i].error("material", "there is no [material." + p.material + "]" + did_you_mean(p.material, names));
         const double edge = spec.size.minCoeff();
         if (p.largest >= edge && edge > 0)
-            tables[i].error("diameter", "grains of " + format_quantity(p.largest, Dimension::length) + " do not fit a box of " +
+            tables[i].error(tables[i].has("psd") ? "psd" : tables[i].has("diameters") ? "diameters" : "diameter", "grains of " + format_quantity(p.largest, Dimension::length) + " do not fit a box of " +
                                             format_quantity(edge, Dimension::length), "enlarge [box] size");
     }
     if (spec.populations.empty()) {
@@ -232,6 +305,7 @@ Spec read_spec(const std::filesystem::path& file, const std::filesystem::path& g
     Spec spec;
     const ConfigTable box = root.table("box");
     spec.size = box.vector("size", Dimension::length);
+    spec.box_location = box.location("size");
     if (box.has("size") && !(spec.size.minCoeff() > 0)) box.error("size", "every edge must be greater than zero");
     const ConfigTable materials = root.table("material");
     for (const std::string& name : materials.keys()) spec.materials.push_back(read_material(materials.table(name), name));
@@ -241,6 +315,7 @@ Spec read_spec(const std::filesystem::path& file, const std::filesystem::path& g
         spec.populations.push_back(read_population(tables[i], file.parent_path(), grains, i));
     spec.dropping = read_dropping(root.table("dropping"));
     spec.compression = read_compression(root.table("compression"));
+    spec.density = read_density(root.table("density"));
     spec.gravity = root.table("gravity").vector("vector", Dimension::acceleration, spec.gravity);
     if (!(spec.gravity.z() < 0)) root.table("gravity").error("vector", "grains are dropped along -z, so z must be negative");
     const ConfigTable time = root.table("time");

@@ -17,22 +17,33 @@ namespace coral::pack {
 /// `table` inverts a gradation curve given **by mass** (log-linear between its points).
 enum class Gradation { single, uniform, table };
 
+/// Corners of a convex polyhedron: the hull of them, at the size of its file [m].
+struct Corners {
+    std::string name;  ///< of the mesh file, or "polyhedron"
+    std::vector<Eigen::Vector3d> points;
+};
+
 /// One kind of grains.
 struct Population {
     std::string name;
     Role role = Role::coarse;
     ShapeKind shape = ShapeKind::sphere;
-    std::filesystem::path file;        ///< grains.vdb or grains.sh.h5; empty for spheres
+    std::string location;              ///< "file:line:column" of its shape, for errors found later
+    std::filesystem::path file;        ///< grains.vdb or grains.sh.h5; empty for other shapes
+    std::vector<Corners> polyhedra;    ///< to draw from; only for `polyhedron`
+    Eigen::Vector3d radii = Eigen::Vector3d::Zero();      ///< of a superellipsoid [m]
+    Eigen::Vector2d exponents = Eigen::Vector2d::Ones();  ///< of a superellipsoid: e1, e2 of Barr
     std::vector<std::int64_t> grains;  ///< ids to draw from; empty means all
     Gradation gradation = Gradation::single;
     double smallest = 0, largest = 0;  ///< diameters [m]; equal for `single`
     Psd psd;                           ///< for `table`
-    bool own_size = false;             ///< no diameter given: grains keep the size of the file (level-set and sh only)
+    bool own_size = false;             ///< no diameter given: grains keep the size of the file, times `scale` (not for spheres)
+    double scale = 1;                  ///< of lengths; only with own_size [-]
     std::optional<std::int64_t> count;
     std::optional<double> mass_fraction;  ///< of the whole sample [-]
     std::string material = "default";
-    int surface_nodes = 0;             ///< 0: 6000 for level-set, 2500 for sh
-    double grid_spacing = 0;           ///< of tabulated sh shapes [m]; 0: equivalent diameter / 60
+    int surface_nodes = 0;             ///< 0: 6000 for level-set, 2500 for others
+    double grid_spacing = 0;           ///< of tabulated sh and superellipsoid shapes [m]; 0: equivalent diameter / 60
 };
 
 /// Grains are poured in alternating layers of coarse and fine; each layer settles before the next comes.
@@ -67,12 +78,19 @@ struct Compression {
     double drag = 50;                ///< rate at which velocities decay during compression and relaxation [1/s]
 };
 
+/// Void ratios of the densest and the loosest state, measured elsewhere (ISO 17892, ASTM D4253 and D4254): no packing can tell them.
+struct DensityLimits {
+    double e_min = 0, e_max = 0;     ///< [-]
+};
+
 struct Spec {
     Eigen::Vector3d size = Eigen::Vector3d::Zero();  ///< box the grains are dropped into; z is the height the grains should fill [m]
     std::vector<Material> materials;
     std::vector<Population> populations;
     Dropping dropping;
     Compression compression;
+    std::optional<DensityLimits> density;
+    std::string box_location;  ///< "file:line:column" of the size of the box, for errors found later
     double dem_step = 0;     ///< [s]; 0: automatic
     Eigen::Vector3d gravity = {0, 0, -9.81};
     std::vector<std::string> warnings;  ///< odd but allowed, for the user to read

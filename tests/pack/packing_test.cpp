@@ -109,7 +109,45 @@ TEST(Populations, follow_a_gradation_by_mass)
 TEST(Populations, refuse_more_grains_than_a_box_can_hold)
 {
     const Spec spec = spec_of("[box]\nsize = [0.01, 0.01, 0.01]\n[[population]]\nrole = \"coarse\"\ndiameter = \"2mm\"\ncount = 200\n");
-    EXPECT_THROW(make_grains(spec, 1), coral::UsageError);
+    try {
+        make_grains(spec, 1);
+        FAIL() << "200 grains of 2 mm in a box of 10 mm";
+    } catch (const coral::UsageError& error) {
+        EXPECT_NE(std::string(error.what()).find("spec.toml:2:1: key 'box.size': the grains fill 83 % of the box"), std::string::npos) << error.what();
+    }
+}
+
+// A tetrahedron with three edges a along the axes has a^3/6, an ellipsoid 4/3 pi a b c.
+TEST(Populations, draw_polyhedra_and_superellipsoids)
+{
+    coral::write_text_file(scratch("wedge.stl"),
+                           "solid wedge\nfacet normal 0 0 -1\nouter loop\nvertex 0 0 0\nvertex 0 6 0\nvertex 6 0 0\nendloop\nendfacet\n"
+                           "facet normal 0 -1 0\nouter loop\nvertex 0 0 0\nvertex 6 0 0\nvertex 0 0 6\nendloop\nendfacet\n"
+                           "facet normal -1 0 0\nouter loop\nvertex 0 0 0\nvertex 0 0 6\nvertex 0 6 0\nendloop\nendfacet\n"
+                           "facet normal 1 1 1\nouter loop\nvertex 6 0 0\nvertex 0 6 0\nvertex 0 0 6\nendloop\nendfacet\nendsolid wedge\n");
+    coral::write_text_file(scratch("large.stl"), [] {
+        std::string text = coral::read_text_file(scratch("wedge.stl"));
+        for (auto at = text.find('6'); at != std::string::npos; at = text.find('6', at)) text[at] = '9';
+        return text;
+    }());
+    const Spec spec = spec_of("[box]\nsize = [0.05, 0.05, 0.05]\n"
+                              "[[population]]\nrole = \"coarse\"\nshape = \"polyhedron\"\nfile = [\"wedge.stl\", \"large.stl\"]\nunit = \"mm\"\nscale = 2\ncount = 10\nsurface_nodes = 500\n"
+                              "[[population]]\nrole = \"fine\"\nshape = \"superellipsoid\"\nradii = [\"3mm\", \"2mm\", \"1mm\"]\ndiameter = \"2mm\"\ncount = 4\n"
+                              "surface_nodes = 500\ngrid_spacing = \"0.2mm\"\n");
+    const Sample s = make_grains(spec, 3).sample;
+    ASSERT_EQ(s.shapes.size(), 3u);
+    int large = 0;
+    for (std::size_t i = 0; i < 10; ++i) {
+        const double v = volume(s, s.particles[i]);
+        if (v > 5e-7) ++large;
+        EXPECT_NEAR(v, v > 5e-7 ? 18e-3 * 18e-3 * 18e-3 / 6 : 12e-3 * 12e-3 * 12e-3 / 6, 1e-15);
+        EXPECT_EQ(s.particles[i].scale, 2);
+    }
+    EXPECT_EQ(large, 5);  // every shape once before any is used again
+    const ShapeTemplate& ellipsoid = s.shapes[2];
+    EXPECT_EQ(ellipsoid.kind, ShapeKind::superellipsoid);
+    EXPECT_NEAR(ellipsoid.volume, 4.0 / 3 * std::numbers::pi * 6e-9, 1e-18);
+    for (std::size_t i = 10; i < 14; ++i) EXPECT_NEAR(equivalent_diameter(s, s.particles[i]), 2e-3, 1e-12);
 }
 
 // Random close packing of spheres is 0.64 solid, random loose 0.55 (packing_fractions.csv); smooth walls four diameters apart leave
@@ -196,6 +234,28 @@ TEST(Packing, goes_on_in_another_world_where_it_stopped)
         const double fall = s.particles[i].velocity.norm() * time + 0.5 * 9.81 * time * time;  // of a grain that nothing holds
         EXPECT_LT((world.position(ids.bodies[i]) - s.particles[i].position).norm(), fall + 1e-3 * 2e-3);
     }
+}
+
+TEST(Packing, of_polyhedra_and_ellipsoids_is_in_balance_and_is_read_back)
+{
+    PackReport report;
+    const Sample s = packed(
+        "[box]\nsize = [\"10mm\", \"10mm\", \"14mm\"]\n"
+        "[[population]]\nrole = \"coarse\"\nshape = \"polyhedron\"\nvertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0.8]]\ndiameter = \"3mm\"\ncount = 8\nsurface_nodes = 600\n"
+        "[[population]]\nrole = \"fine\"\nshape = \"superellipsoid\"\nradii = [1, 0.8, 0.7]\nexponents = [0.8, 0.9]\ndiameter = \"1.2mm\"\nmass_fraction = 0.3\nsurface_nodes = 600\ngrid_spacing = 0.06\n"
+        "[material.default]\nnormal_stiffness = 2e4\ntangential_stiffness = 1e4\n[density]\ne_min = 0.1\ne_max = 3\n"
+        "[dropping]\ntime_limit = \"60ms\"\n[compression]\npressure = \"5kPa\"\nwalls = \"top\"\nunbalanced_ratio = 0.03\n", 2, report);
+    EXPECT_TRUE(report.compressed);
+    EXPECT_NEAR(s.statistics.fines_content, 0.3, 0.02);
+    EXPECT_LT(s.statistics.unbalanced_ratio, 0.03);
+    EXPECT_NEAR(s.walls[5].pressure, 5e3, 0.1 * 5e3);
+    EXPECT_NEAR(report.relative_density, (3 - s.statistics.void_ratio) / 2.9, 1e-12);
+    write_sample(s, scratch("angular.h5"));
+    const Sample loaded = read_sample(scratch("angular.h5"));
+    EXPECT_EQ(loaded.shapes[0].vertices, s.shapes[0].vertices);
+    EXPECT_EQ(loaded.shapes[1].radii, s.shapes[1].radii);
+    EXPECT_EQ(loaded.criteria.back().name, "skempton-brogan");
+    EXPECT_GT(loaded.criteria.back().value, 0);
 }
 
 // Hollow capsules with fines: the level-set path from .vdb to a sample in balance.

@@ -71,7 +71,6 @@ TEST(PackingSpec, refuses_what_cannot_be_packed)
     expect_message(box + coarse + "[[population]]\nrole = \"fine\"\ndiameter = 0\ncount = 5\n", "must be greater than zero");
     expect_message(box + "[[population]]\nrole = \"coarse\"\nshape = \"level-set\"\ncount = 5\n", "write file = \"grains.vdb\"");
     expect_message(box + "[[population]]\nrole = \"coarse\"\nshape = \"level-set\"\nfile = \"none.vdb\"\ncount = 5\n", "does not exist");
-    expect_message(box + "[[population]]\nrole = \"coarse\"\nshape = \"polyhedron\"\ndiameter = 0.01\ncount = 5\n", "is not supported yet");
     expect_message(box + coarse + "[[population]]\nrole = \"fine\"\ncount = 3\nmass_fraction = 0.3\ndiameter = 0.002\n", "either count or mass_fraction");
     expect_message(box + "[[population]]\nrole = \"coarse\"\ndiameter = \"70mm\"\ncount = 2\n", "do not fit a box of");
     expect_message(box + coarse + "[compression]\npressure = 1\nvoid_ratio = 1\n", "keep one of them");
@@ -86,6 +85,60 @@ TEST(PackingSpec, refuses_a_gradation_that_does_not_reach_from_zero_to_all)
     expect_message(start + "psd = { size = [\"1mm\", \"2mm\"], passing = [0.1, 1] }\n", "starts at 10 %, not 0 %");
     expect_message(start + "psd = { size = [\"2mm\", \"1mm\"], passing = [0, 1] }\n", "must rise");
     expect_message(start + "psd = { size = [\"2mm\"], passing = [0, 1] }\n", "same length");
+}
+
+namespace {
+
+/// A population of 5 coarse grains whose shape is given by `keys`; the population begins at line 3.
+std::string shaped(const std::string& keys) { return box + "[[population]]\nrole = \"coarse\"\ncount = 5\n" + keys; }
+const std::string tetrahedron = "shape = \"polyhedron\"\nvertices = [[0, 0, 0], [\"6mm\", 0, 0], [0, \"6mm\", 0], [0, 0, \"6mm\"]]\n";
+
+}  // namespace
+
+TEST(PackingSpec, reads_polyhedra_and_superellipsoids)
+{
+    Population p = spec_of(shaped(tetrahedron + "scale = 2\n")).populations[0];
+    EXPECT_EQ(p.shape, ShapeKind::polyhedron);
+    ASSERT_EQ(p.polyhedra.size(), 1u);
+    EXPECT_EQ(p.polyhedra[0].points[1], Eigen::Vector3d(6e-3, 0, 0));
+    EXPECT_TRUE(p.own_size);
+    EXPECT_EQ(p.scale, 2);
+    EXPECT_EQ(p.surface_nodes, 2500);
+    p = spec_of(shaped("shape = \"superellipsoid\"\nradii = [\"3mm\", \"2mm\", \"1mm\"]\nexponents = [0.5, 1]\ndiameters = [\"1mm\", \"2mm\"]\n")).populations[0];
+    EXPECT_EQ(p.shape, ShapeKind::superellipsoid);
+    EXPECT_EQ(p.radii, Eigen::Vector3d(3e-3, 2e-3, 1e-3));
+    EXPECT_EQ(p.exponents, Eigen::Vector2d(0.5, 1));
+    EXPECT_FALSE(p.own_size);
+}
+
+TEST(PackingSpec, refuses_shapes_without_size_at_their_place)
+{
+    expect_message(shaped("shape = \"superellipsoid\"\nradii = [\"3mm\", 0, \"1mm\"]\n"), ".toml:7:1: key 'population.radii' has a radius that is not above zero");
+    expect_message(shaped("shape = \"superellipsoid\"\nradii = [1, 1, 1]\nexponents = [3, 1]\n"), ".toml:8:1: key 'population.exponents' has 3, outside (0, 2]");
+    expect_message(shaped("shape = \"superellipsoid\"\n"), "radii' is missing");
+    expect_message(shaped("shape = \"polyhedron\"\nvertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]]\n"), ".toml:7:1: key 'population.vertices'");
+    expect_message(shaped("shape = \"polyhedron\"\nvertices = [[0, 0, 0], [0, 0, 0], [0, 0, 0], [0, 0, 0]]\n"), "vertices'");
+    expect_message(shaped("shape = \"polyhedron\"\n"), "give file = \"stone.stl\"");
+    expect_message(shaped("shape = \"polyhedron\"\nfile = \"none.stl\"\nunit = \"mm\"\n"), "does not exist");
+    expect_message(shaped("shape = \"polyhedron\"\nfile = \"stone.obj\"\nunit = \"mm\"\n"), "take a .stl or .ply file");
+    expect_message(shaped("shape = \"polyhedron\"\nfile = []\nunit = \"mm\"\n"), "is an empty list");
+    expect_message(shaped(tetrahedron + "scale = 0\n"), "scale' must be greater than zero");
+    expect_message(shaped(tetrahedron + "scale = 2\ndiameter = \"5mm\"\n"), "keep one of them");
+    expect_message(shaped("scale = 2\n"), "write diameter");
+    expect_message(box + coarse + "[[population]]\nrole = \"fine\"\nmass_fraction = 0.3\npsd = { size = [0, \"2mm\"], passing = [0, 1] }\n", ".toml:10:");
+    expect_message(box + coarse + "material = \"shell\"\n", ".toml:7:1: key 'population.material' there is no [material.shell]");
+}
+
+TEST(PackingSpec, takes_both_limits_of_the_void_ratio_or_none)
+{
+    const Spec s = spec_of(box + coarse + "[density]\ne_min = 0.8\ne_max = \"140%\"\n");
+    ASSERT_TRUE(s.density.has_value());
+    EXPECT_EQ(s.density->e_min, 0.8);
+    EXPECT_DOUBLE_EQ(s.density->e_max, 1.4);
+    EXPECT_FALSE(spec_of(box + coarse).density.has_value());
+    expect_message(box + coarse + "[density]\ne_min = 0.8\n", "e_max' is missing");
+    expect_message(box + coarse + "[density]\ne_min = 0.8\ne_max = 0.7\n", ".toml:9:1: key 'density.e_max' is 0.7, not above e_min of 0.8");
+    expect_message(box + coarse + "[density]\ne_min = 0\ne_max = 0.7\n", "must be greater than zero");
 }
 
 TEST(PackingSpec, warns_of_a_sample_without_fines)
