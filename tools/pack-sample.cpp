@@ -8,6 +8,8 @@
 #include "cli.h"
 #include "core/error.h"
 #include "core/output_file.h"
+#include "core/text.h"
+#include "pack-sample/psd_figure.h"
 #include "pack/pack.h"
 
 using namespace coral;
@@ -15,7 +17,7 @@ using namespace coral;
 namespace {
 
 struct Options {
-    std::filesystem::path input, output, grains;
+    std::filesystem::path input, output, grains, psd_figure;
 };
 
 void declare(cli::Options& options, Options& o)
@@ -23,6 +25,7 @@ void declare(cli::Options& options, Options& o)
     options.add("input", o.input, "Specification of the packing, .toml (keys: docs/pack-spec.md)").required();
     options.add("-o,--output", o.output, "Sample, .h5").required();
     options.add("--grains", o.grains, "Level-set grains, .vdb, in place of the files that the specification names").existing_file();
+    options.add("--psd-figure", o.psd_figure, "Picture of the gradation, .png or .svg (needs gnuplot)");
 }
 
 /// JSON has no NaN: what does not exist is null.
@@ -42,6 +45,7 @@ nlohmann::ordered_json to_json(const pack::Sample& sample, const pack::PackRepor
     json["interparticle_porosity"] = s.interparticle_porosity;
     json["void_ratio"] = s.void_ratio;
     json["interparticle_void_ratio"] = s.interparticle_void_ratio;
+    if (std::isfinite(report.relative_density)) json["relative_density"] = report.relative_density;
     json["fines_content"] = s.fines_content;
     json["gap_ratio"] = number(s.gap_ratio);
     json["coordination"] = s.coordination;
@@ -79,6 +83,7 @@ std::string to_text(const pack::Sample& sample, const pack::PackReport& report, 
     const auto line = [&](const char* name, const std::string& value) { text += fmt::format("  {:32} {}\n", name, value); };
     line("porosity", fmt::format("{:.4f} with intraparticle voids, {:.4f} without", s.porosity, s.interparticle_porosity));
     line("void ratio", fmt::format("{:.4f} with intraparticle voids, {:.4f} without", s.void_ratio, s.interparticle_void_ratio));
+    if (std::isfinite(report.relative_density)) line("relative density", fmt::format("{:.1f} %", 100 * report.relative_density));
     line("fines content by mass", fmt::format("{:.4f}, gap ratio {:.2f}", s.fines_content, s.gap_ratio));
     line("coordination number", fmt::format("{:.2f} (coarse-coarse {:.2f}, coarse-fine {:.2f}, fine-coarse {:.2f}, fine-fine {:.2f})", s.coordination,
                                             s.coordination_coarse_coarse, s.coordination_coarse_fine, s.coordination_fine_coarse, s.coordination_fine_fine));
@@ -99,13 +104,16 @@ void run(const Options& o, const cli::Context& context, std::uint64_t seed)
     const pack::Spec spec = pack::read_spec(o.input, o.grains);
     if (!std::filesystem::is_directory(o.output.has_parent_path() ? o.output.parent_path() : "."))
         throw UsageError(o.output.string(), "its folder does not exist", "make the folder first");
+    if (!o.psd_figure.empty()) tool::check_psd_figure(o.psd_figure);
     pack::PackReport report;
     pack::Sample sample = pack::pack(spec, seed, report);
     RecordEntry entry = context.record;
     if (!o.grains.empty()) entry.options["grains"] = o.grains.filename().string();  // no folders in a history
     entry.options["specification"] = read_text_file(o.input);  // a file name alone would not repeat the run
+    if (std::isfinite(report.relative_density)) entry.options["relative_density"] = coral::to_text(report.relative_density);
     sample.history.push_back(std::move(entry));
     pack::write_sample(sample, o.output);
+    if (!o.psd_figure.empty()) tool::draw_psd(sample, o.psd_figure);
     for (const std::string& warning : report.warnings) spdlog::warn("{}", warning);
     cli::print_summary(context, to_json(sample, report), to_text(sample, report, o.output));
 }

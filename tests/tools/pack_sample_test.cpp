@@ -27,6 +27,18 @@ TEST(PackSample, writes_a_sample_and_its_figures_as_json)
         EXPECT_NE(result.out.find(key), std::string::npos) << key << " is missing in " << result.out;
 }
 
+TEST(PackSample, draws_the_gradation_and_tells_the_relative_density)
+{
+    const ScratchFolder folder;
+    write_text(folder.path() / "spec.toml", spec + "[density]\ne_min = 0.4\ne_max = 1.2\n");
+    const ProgramResult result = run_program("pack-sample spec.toml -o sample.h5 --psd-figure psd.png --seed 3", folder.path());
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_GT(std::filesystem::file_size(folder.path() / "psd.png"), 1000u);
+    EXPECT_NE(result.out.find("relative density"), std::string::npos) << result.out;
+    EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 3);  // nothing is left behind
+    EXPECT_EQ(run_program("pack-sample spec.toml -o sample.h5 --psd-figure psd.gif", folder.path()).exit_code, 2);
+}
+
 TEST(PackSample, reports_every_wrong_key_of_a_specification_and_ends_with_2)
 {
     const ScratchFolder folder;
