@@ -26,7 +26,7 @@ struct ApparentShape {
 /// with c the geometric mean of the voxel edges. Closed voids and voids behind throats narrower than 2R fill.
 /// The largest throat follows from b(x) = max over paths from outside of the least d on the path: it is 2 b, the largest
 /// over voids that widen behind the constriction (d > b + c), with the ball then moved off the voxel centre (detail/throat.h). Round
-/// throats of ten voxels and more are met within half a voxel, narrower ones within 1.5. Voids behind throats wider than 2R are
+/// throats of five voxels and more are met within 0.6 voxel (docs/validation/geometry.md). Voids behind throats wider than 2R are
 /// outside and not seen.
 /// \param radius  of the ball [m]
 /// \param voids   when given: the voids one by one, largest first; as many as void_count. Costs one more distance transform.

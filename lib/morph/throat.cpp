@@ -140,7 +140,10 @@ double throat_diameter(const Closing& closing, std::size_t saddle, float radius)
     double narrowest = ball.radius;
     for (const double shift : {-1.0, -0.5, 0.5, 1.0})
         narrowest = std::min(narrowest, fit_across(room, ball.centre + shift * c * ball.axis, c, farthest).radius);
-    return 2.0 * narrowest;
+    // A ball gains at most half the diagonal of a voxel by leaving the lattice, and loses what lies between the centres of solid voxels and
+    // their surface; more means that it found a way out of a short throat.
+    constexpr double most_gained = 0.55;
+    return 2.0 * std::min(narrowest, (double(radius) + most_gained) * c);
 }
 
 }  // namespace coral::morph::detail
