@@ -18,6 +18,7 @@ namespace {
 
 struct Options {
     std::filesystem::path input, output, grains, psd_figure;
+    double scale = 1;
 };
 
 void declare(cli::Options& options, Options& o)
@@ -25,6 +26,7 @@ void declare(cli::Options& options, Options& o)
     options.add("input", o.input, "Specification of the packing, .toml (keys: docs/pack-spec.md)").required();
     options.add("-o,--output", o.output, "Sample, .h5").required();
     options.add("--grains", o.grains, "Level-set grains, .vdb, in place of the files that the specification names").existing_file();
+    options.add("--scale", o.scale, "Factor on the lengths of shapes that keep the size of their file [-]");
     options.add("--psd-figure", o.psd_figure, "Picture of the gradation, .png or .svg (needs gnuplot)");
 }
 
@@ -101,7 +103,9 @@ std::string to_text(const pack::Sample& sample, const pack::PackReport& report, 
 
 void run(const Options& o, const cli::Context& context, std::uint64_t seed)
 {
-    const pack::Spec spec = pack::read_spec(o.input, o.grains);
+    if (!(o.scale > 0)) throw UsageError("--scale", "must be greater than zero, is " + coral::to_text(o.scale), "1 keeps the size of the file");
+    pack::Spec spec = pack::read_spec(o.input, o.grains);
+    if (o.scale != 1) pack::scale_grains(spec, o.scale);
     if (!std::filesystem::is_directory(o.output.has_parent_path() ? o.output.parent_path() : "."))
         throw UsageError(o.output.string(), "its folder does not exist", "make the folder first");
     if (!o.psd_figure.empty()) tool::check_psd_figure(o.psd_figure);
@@ -109,6 +113,7 @@ void run(const Options& o, const cli::Context& context, std::uint64_t seed)
     pack::Sample sample = pack::pack(spec, seed, report);
     RecordEntry entry = context.record;
     if (!o.grains.empty()) entry.options["grains"] = o.grains.filename().string();  // no folders in a history
+    entry.options.erase("psd-figure");  // makes no difference to the sample
     entry.options["specification"] = read_text_file(o.input);  // a file name alone would not repeat the run
     if (std::isfinite(report.relative_density)) entry.options["relative_density"] = coral::to_text(report.relative_density);
     sample.history.push_back(std::move(entry));

@@ -328,4 +328,15 @@ Spec read_spec(const std::filesystem::path& file, const std::filesystem::path& g
     return spec;
 }
 
+void scale_grains(Spec& spec, double factor)
+{
+    bool any = false;
+    for (Population& p : spec.populations) {
+        if (!p.own_size) continue;
+        p.scale *= factor;
+        any = true;
+    }
+    if (!any) throw UsageError("--scale", "every population of the specification has diameters of its own", "remove --scale, or the diameters of a population");
+}
+
 }  // namespace coral::pack

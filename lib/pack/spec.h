@@ -101,4 +101,8 @@ struct Spec {
 /// \throws UsageError with all errors at once, one a line
 Spec read_spec(const std::filesystem::path& file, const std::filesystem::path& grains = {});
 
+/// Multiplies the lengths of every population that keeps the size of its file.
+/// \throws UsageError  when none does
+void scale_grains(Spec& spec, double factor);
+
 }  // namespace coral::pack

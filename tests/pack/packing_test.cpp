@@ -117,6 +117,18 @@ TEST(Populations, refuse_more_grains_than_a_box_can_hold)
     }
 }
 
+TEST(Populations, name_the_place_of_a_grain_that_the_file_does_not_have)
+{
+    coral::sdf::write_grains(scratch("one.vdb"), std::vector{hollow_capsule(1, 1.5e-3, 1e-3, 0.8e-3, 3e-4)}, {{"test", "1", {}, {}}});
+    const Spec spec = spec_of("[box]\nsize = [0.02, 0.02, 0.02]\n[[population]]\nrole = \"coarse\"\nshape = \"level-set\"\nfile = \"one.vdb\"\ngrains = [1, 7]\ncount = 2\n");
+    try {
+        make_grains(spec, 1);
+        FAIL() << "the file has no grain 7";
+    } catch (const coral::UsageError& error) {
+        EXPECT_NE(std::string(error.what()).find("spec.toml:6:1: population 'coarse1' asks for grain 7"), std::string::npos) << error.what();
+    }
+}
+
 // A tetrahedron with three edges a along the axes has a^3/6, an ellipsoid 4/3 pi a b c.
 TEST(Populations, draw_polyhedra_and_superellipsoids)
 {
@@ -175,6 +187,14 @@ TEST(Packing, of_spheres_is_dense_and_in_balance_at_its_pressure)
     const double bottom = s.walls[4].pressure * s.size.x() * s.size.y(), top = s.walls[5].pressure * s.size.x() * s.size.y();
     EXPECT_NEAR(bottom - top, weight, 0.02 * top);  // smooth side walls carry nothing
     EXPECT_EQ(s.walls[4].point.z(), 0);
+    // forces times branch vectors over all grains are the mean stress: the pressure of the walls
+    double work = 0;
+    for (const Contact& c : s.contacts) {
+        const Eigen::Vector3d force = c.normal_force + c.tangential_force;
+        work -= force.dot(c.point - s.particles[std::size_t(c.first)].position);
+        if (c.second >= 0) work += force.dot(c.point - s.particles[std::size_t(c.second)].position);
+    }
+    EXPECT_NEAR(work / (3 * s.size.prod()), s.statistics.mean_pressure, 0.02 * s.statistics.mean_pressure);
 }
 
 TEST(Packing, is_the_same_for_any_number_of_threads_and_another_for_another_seed)

@@ -129,6 +129,16 @@ TEST(PackingSpec, refuses_shapes_without_size_at_their_place)
     expect_message(box + coarse + "material = \"shell\"\n", ".toml:7:1: key 'population.material' there is no [material.shell]");
 }
 
+TEST(PackingSpec, scales_only_grains_that_keep_the_size_of_their_file)
+{
+    Spec s = spec_of(shaped(tetrahedron + "scale = 2\n") + fine);
+    scale_grains(s, 1.5);
+    EXPECT_EQ(s.populations[0].scale, 3);
+    EXPECT_EQ(s.populations[1].scale, 1);
+    s = spec_of(box + coarse);
+    EXPECT_THROW(scale_grains(s, 1.5), coral::UsageError);
+}
+
 TEST(PackingSpec, takes_both_limits_of_the_void_ratio_or_none)
 {
     const Spec s = spec_of(box + coarse + "[density]\ne_min = 0.8\ne_max = \"140%\"\n");

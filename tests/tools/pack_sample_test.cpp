@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "core/output_file.h"
 #include "tools/run_program.h"
 
 namespace coral::test {
@@ -37,6 +38,7 @@ TEST(PackSample, draws_the_gradation_and_tells_the_relative_density)
     EXPECT_NE(result.out.find("relative density"), std::string::npos) << result.out;
     EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 3);  // nothing is left behind
     EXPECT_EQ(run_program("pack-sample spec.toml -o sample.h5 --psd-figure psd.gif", folder.path()).exit_code, 2);
+    EXPECT_EQ(read_text_file(folder.path() / "sample.h5").find("psd.png"), std::string::npos);  // a picture does not change the sample
 }
 
 TEST(PackSample, reports_every_wrong_key_of_a_specification_and_ends_with_2)
@@ -48,6 +50,26 @@ TEST(PackSample, reports_every_wrong_key_of_a_specification_and_ends_with_2)
     EXPECT_NE(result.err.find("spec.toml:2:"), std::string::npos) << result.err;
     EXPECT_NE(result.err.find("did you mean 'diameter'"), std::string::npos) << result.err;
     EXPECT_FALSE(std::filesystem::exists(folder.path() / "sample.h5"));
+}
+
+TEST(PackSample, ends_with_2_on_a_scale_that_scales_nothing)
+{
+    const ScratchFolder folder;
+    write_text(folder.path() / "spec.toml", spec);
+    const ProgramResult result = run_program("pack-sample spec.toml -o sample.h5 --scale 2", folder.path());
+    EXPECT_EQ(result.exit_code, 2);
+    EXPECT_NE(result.err.find("diameters of its own"), std::string::npos) << result.err;
+    EXPECT_EQ(run_program("pack-sample spec.toml -o sample.h5 --scale 0", folder.path()).exit_code, 2);
+}
+
+TEST(PackSample, ends_with_1_on_a_damaged_mesh)
+{
+    const ScratchFolder folder;
+    write_text(folder.path() / "stone.stl", "this is no mesh");
+    write_text(folder.path() / "spec.toml", "[box]\nsize = [0.02, 0.02, 0.02]\n[[population]]\nrole = \"coarse\"\nshape = \"polyhedron\"\nfile = \"stone.stl\"\nunit = \"mm\"\ncount = 2\n");
+    const ProgramResult result = run_program("pack-sample spec.toml -o sample.h5", folder.path());
+    EXPECT_EQ(result.exit_code, 1) << result.err;
+    EXPECT_NE(result.err.find("stone.stl"), std::string::npos) << result.err;
 }
 
 TEST(PackSample, ends_with_1_on_a_damaged_grain_file)
