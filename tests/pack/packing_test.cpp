@@ -261,12 +261,12 @@ TEST(Packing, of_polyhedra_and_ellipsoids_is_in_balance_and_is_read_back)
     PackReport report;
     const Sample s = packed(
         "[box]\nsize = [\"10mm\", \"10mm\", \"14mm\"]\n"
-        "[[population]]\nrole = \"coarse\"\nshape = \"polyhedron\"\nvertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0.8]]\ndiameter = \"3mm\"\ncount = 8\nsurface_nodes = 600\n"
-        "[[population]]\nrole = \"fine\"\nshape = \"superellipsoid\"\nradii = [1, 0.8, 0.7]\nexponents = [0.8, 0.9]\ndiameter = \"1.2mm\"\nmass_fraction = 0.3\nsurface_nodes = 600\ngrid_spacing = 0.06\n"
+        "[[population]]\nrole = \"coarse\"\nshape = \"polyhedron\"\nvertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0.8]]\ndiameter = \"3mm\"\ncount = 5\nsurface_nodes = 250\n"
+        "[[population]]\nrole = \"fine\"\nshape = \"superellipsoid\"\nradii = [1, 0.8, 0.7]\nexponents = [0.8, 0.9]\ndiameter = \"1.8mm\"\nmass_fraction = 0.3\nsurface_nodes = 250\ngrid_spacing = 0.06\n"
         "[material.default]\nnormal_stiffness = 2e4\ntangential_stiffness = 1e4\n[density]\ne_min = 0.1\ne_max = 3\n"
         "[dropping]\ntime_limit = \"60ms\"\n[compression]\npressure = \"5kPa\"\nwalls = \"top\"\nunbalanced_ratio = 0.03\n", 2, report);
     EXPECT_TRUE(report.compressed);
-    EXPECT_NEAR(s.statistics.fines_content, 0.3, 0.02);
+    EXPECT_NEAR(s.statistics.fines_content, 0.3, 0.05);
     EXPECT_LT(s.statistics.unbalanced_ratio, 0.03);
     EXPECT_NEAR(s.walls[5].pressure, 5e3, 0.1 * 5e3);
     EXPECT_NEAR(report.relative_density, (3 - s.statistics.void_ratio) / 2.9, 1e-12);
