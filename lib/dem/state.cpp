@@ -9,6 +9,7 @@ namespace coral::dem {
 namespace {
 
 constexpr std::uint64_t magic = 0x3230'4d45'4452'4f43;  // "CORDEM02"
+constexpr std::uint64_t magic_name = 0x0000'ffff'ffff'ffff;  // the part without the version
 
 std::uint64_t checksum(std::span<const std::uint8_t> bytes)
 {
@@ -104,6 +105,8 @@ void World::restore(std::span<const std::uint8_t> state)
     std::uint64_t head[4] = {};
     in(head);
     const std::span<const std::uint8_t> rest = state.subspan(in.at);
+    if (head[0] != magic && (head[0] & magic_name) == (magic & magic_name))
+        throw Error("checkpoint", "another version of the tools wrote the state of the bodies", "resume with that version, or start the run anew");
     if (head[0] != magic || checksum(rest) != head[1]) throw Error("checkpoint", "the state of the bodies is damaged", "use an older checkpoint");
     if (head[2] != m.x.size() || head[3] != m.walls.size())
         throw Error("checkpoint", "it holds " + std::to_string(head[2]) + " bodies and " + std::to_string(head[3]) + " walls, the case has " +

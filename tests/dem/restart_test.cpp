@@ -86,6 +86,14 @@ TEST(Restart, threads_and_lists_change_no_bit_and_a_restart_goes_on_bit_for_bit)
     std::vector<std::uint8_t> damaged = state;
     damaged[damaged.size() / 2] ^= 1;
     EXPECT_THROW(resumed.restore(damaged), Error);
+    std::vector<std::uint8_t> older = state;
+    older[7] = '1';  // of the version
+    try {
+        resumed.restore(older);
+        ADD_FAILURE() << "an older state was taken";
+    } catch (const Error& error) {
+        EXPECT_NE(std::string(error.what()).find("another version"), std::string::npos) << error.what();
+    }
     EXPECT_THROW(resumed.restore(std::span(state).first(100)), Error);
     World other = quiet_world(0.3, 0.7);
     EXPECT_THROW(other.restore(state), Error);
