@@ -1,0 +1,63 @@
+#pragma once
+/// \file pack/detail/swap.h
+/// New templates for a swap (pack/swap.h), and the relaxation after it.
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "pack/sample.h"
+#include "pack/swap.h"
+
+namespace coral::pack::detail {
+
+/// What a shape can be made from: a harmonic surface, the apparent level set, or points on the surface. Lengths as in the source.
+struct Stone {
+    std::int64_t id = 0;
+    std::string name;
+    int degree = 0;                    ///< of `coefficients`
+    std::vector<double> coefficients;  ///< of harmonics; empty: to be fitted to `apparent`
+    Eigen::Vector3d centre = Eigen::Vector3d::Zero();  ///< of the harmonics, in the frame of the grain [m]
+    double volume = 0;                                 ///< apparent [m3]
+    std::shared_ptr<const sdf::DistanceGrid> apparent;
+    std::vector<Eigen::Vector3d> points;
+};
+
+/// Number at the end of the name of a template ("grains.vdb grain_3"); none when there is none.
+std::optional<std::int64_t> id_of(const std::string& name);
+
+Stone stone_of(const ShapeTemplate& shape);
+
+struct Library {
+    std::vector<Stone> stones;
+    History history;
+};
+/// All shapes of a .sh.h5 or .vdb file. \throws Error when damaged or empty
+Library read_library(const std::filesystem::path& file);
+
+/// A template, and where its origin (its centre of mass) lies in the frame of the stone [m].
+struct NewShape {
+    ShapeTemplate shape;
+    Eigen::Vector3d origin = Eigen::Vector3d::Zero();
+};
+
+/// Harmonics of a stone with the body scaled to `volume` about its centre [m3].
+/// \param reach  distance outside that contact queries [m]
+/// \throws Error when fewer than nine tenths of the directions cross the surface once
+NewShape harmonic_shape(const Stone& stone, double volume, int degree, double reach, int nodes, std::vector<std::string>& warnings);
+
+/// Hull of a stone thinned to at most `faces` triangles, scaled to `volume`: starting from the points farthest along the axes, the point
+/// farthest outside is taken in until the hull has as many corners as faces allow.
+NewShape polyhedral_shape(const Stone& stone, double volume, int faces, int nodes);
+
+/// Turns grains whose orientation is free: of 60 random ones, twice over, each takes the one in which its corners lie least in its
+/// neighbours and theirs in it (sum of squared depths).
+void turn_to_fit(Sample& sample, const std::vector<std::size_t>& grains, const std::function<Eigen::Quaterniond()>& random_turn);
+
+/// Relaxes the new sample, whose grains stand where `replaced` has them; measures it. `moved_out` lies beside the particles.
+void relax_swapped(Sample& sample, const Sample& before, const std::vector<char>& moved_out, const SwapOptions& options, SwapReport& report);
+
+}  // namespace coral::pack::detail
