@@ -130,8 +130,8 @@ void measure_displacements(const dem::World& world, const Sample& sample, const 
 /// Refuses what would burst the sample, or is no longer the same sample.
 void check(const dem::World& world, const Box& box, const SwapOptions& options, const SwapReport& report)
 {
-    const std::string help = report.trapped.empty() ? "take shapes nearer to the old ones (a higher --degree, more --faces), or raise the limit"
-                                                    : "add --drop-trapped, or take shapes nearer to the old ones";
+    const std::string help = report.trapped.empty() || options.drop_trapped ? "take shapes nearer to the old ones (a higher --degree, more --faces), or raise the limit"
+                                                                           : "add --drop-trapped, or take shapes nearer to the old ones";
     if (report.after.largest > options.overlap_limit)
         throw Error("swap", "grains still overlap by " + percent(report.after.largest) + " of the smaller diameter after the relaxation (" +
                                 percent(report.swapped.largest) + " before it; --overlap-limit is " + percent(options.overlap_limit) + ")", help);
