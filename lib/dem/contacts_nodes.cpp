@@ -8,7 +8,7 @@ namespace coral::dem {
 
 namespace {
 
-constexpr double sigmoid = 100.0;  ///< c of the potential [docs/numerics.md, contact]
+using detail::sigmoid;
 
 /// What the nodes of one pair are tested against.
 struct Field {

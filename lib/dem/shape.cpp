@@ -10,6 +10,7 @@
 
 #include "core/error.h"
 #include "core/text.h"
+#include "dem/detail/contact_law.h"
 
 namespace coral::dem {
 
@@ -138,7 +139,7 @@ void Shape::take_inertia(const Eigen::Matrix3d& inertia)
 
 void Shape::measure_flatness(std::span<const Eigen::Vector3d> directions)
 {
-    constexpr double c = 100.0;  // of the node law [docs/numerics.md, contact]
+    constexpr double c = detail::sigmoid;
     for (const Eigen::Vector3d& n : directions) {
         double height = -std::numeric_limits<double>::infinity(), area = 0.0;
         for (const Eigen::Vector3d& p : nodes_) height = std::max(height, n.dot(p));

@@ -63,12 +63,12 @@ void envelope_column(int c, int n, double w, Scratch& s)
         s.apex[std::size_t(top)] = q;
         s.from[std::size_t(top)] = start;
     }
-    s.from[std::size_t(top + 1)] = std::numeric_limits<double>::infinity();
+    if (top < 0) {
+        for (int q = 0; q < n; ++q) s.after[std::size_t(q)][c] = infinity;
+        return;
+    }
+    s.from[std::size_t(top) + 1] = std::numeric_limits<double>::infinity();
     for (int q = 0, e = 0; q < n; ++q) {
-        if (top < 0) {
-            s.after[std::size_t(q)][c] = infinity;
-            continue;
-        }
         while (s.from[std::size_t(e) + 1] < q) ++e;
         const double step = double(q - s.apex[std::size_t(e)]);
         s.after[std::size_t(q)][c] = float(double(f[std::size_t(s.apex[std::size_t(e)])]) + w2 * step * step);

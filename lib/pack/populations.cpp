@@ -15,6 +15,7 @@
 #include "dem/polyhedron.h"
 #include "dem/superellipsoid.h"
 #include "pack/criteria.h"
+#include "pack/detail/random.h"
 #include "sdf/extend.h"
 #include "sdf/mass_properties.h"
 #include "sdf/surface_nodes.h"
@@ -25,9 +26,8 @@
 namespace coral::pack {
 namespace {
 
-using Random = std::mt19937_64;
-
-double uniform(Random& random) { return double(random() >> 11) * 0x1p-53; }
+using detail::Random;
+using detail::uniform;
 
 /// What a file tells about its grains before any is loaded.
 struct Source {

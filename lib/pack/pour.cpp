@@ -9,23 +9,13 @@
 #include "core/progress.h"
 #include "core/text.h"
 #include "pack/detail/phases.h"
+#include "pack/detail/random.h"
 #include "pack/sample_world.h"
 
 namespace coral::pack::detail {
 namespace {
 
-using Random = std::mt19937_64;
 using Batch = std::vector<int>;  ///< particles dropped together
-
-double uniform(Random& random) { return double(random() >> 11) * 0x1p-53; }
-
-/// Evenly distributed rotation [Shoemake 1992].
-Eigen::Quaterniond random_rotation(Random& random)
-{
-    const double u = uniform(random), v = 2 * std::numbers::pi * uniform(random), w = 2 * std::numbers::pi * uniform(random);
-    const double a = std::sqrt(1 - u), b = std::sqrt(u);
-    return {b * std::cos(w), a * std::sin(v), a * std::cos(v), b * std::sin(w)};
-}
 
 void shuffle(std::vector<int>& items, Random& random)
 {

@@ -12,6 +12,7 @@
 #include "core/error.h"
 #include "core/progress.h"
 #include "core/text.h"
+#include "pack/detail/random.h"
 #include "pack/detail/swap.h"
 #include "pack/populations.h"
 #include "pack/sample_world.h"
@@ -21,19 +22,8 @@ namespace coral::pack {
 namespace {
 
 using Vec3 = Eigen::Vector3d;
-using Random = std::mt19937_64;
 
 constexpr int level_set_nodes = 6000, harmonic_nodes = 2500;
-
-double uniform(Random& random) { return double(random() >> 11) * 0x1p-53; }
-
-/// Even over all rotations [Shoemake 1992].
-Eigen::Quaterniond random_turn(Random& random)
-{
-    const double u = uniform(random), a = 2 * std::numbers::pi * uniform(random), b = 2 * std::numbers::pi * uniform(random);
-    const double s = std::sqrt(1 - u), t = std::sqrt(u);
-    return {t * std::cos(b), s * std::sin(a), s * std::cos(a), t * std::sin(b)};
-}
 
 bool same_template(const ShapeTemplate& a, const ShapeTemplate& b)
 {
@@ -62,7 +52,7 @@ public:
         sample_.shapes.clear();
         for (const Role role : {Role::coarse, Role::fine}) swap_role(role);
         keep_others();
-        detail::turn_to_fit(sample_, drawn_, [&] { return random_turn(random_); });
+        detail::turn_to_fit(sample_, drawn_, [&] { return detail::random_rotation(random_); });
         if (report_.swapped_coarse + report_.swapped_fine == 0)
             throw UsageError("sample", "has nothing to swap: all its grains have the shapes asked for already", "ask for other shapes");
         for (const RecordEntry& step : library_.history) {
@@ -244,10 +234,10 @@ private:
             if (p.role != role || p.shape != from) continue;
             if (deck.empty()) {
                 deck = drawn;
-                for (std::size_t k = deck.size() - 1; k > 0; --k) std::swap(deck[k], deck[std::size_t(uniform(random_) * double(k + 1))]);
+                for (std::size_t k = deck.size() - 1; k > 0; --k) std::swap(deck[k], deck[std::size_t(detail::uniform(random_) * double(k + 1))]);
             }
             sample_.particles[i].shape = deck.back();
-            sample_.particles[i].orientation = random_turn(random_);
+            sample_.particles[i].orientation = detail::random_rotation(random_);
             deck.pop_back();
             count(role);
             new_.push_back(i);
@@ -319,7 +309,7 @@ private:
     const Sample& old_;
     const SwapOptions& options_;
     SwapReport& report_;
-    Random random_;
+    detail::Random random_;
     Sample sample_;
     std::vector<Vec3> origin_;         ///< of the new frame in the old one, at the old scale [m]
     std::vector<std::size_t> new_;     ///< grains with a new shape

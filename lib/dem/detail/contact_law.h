@@ -99,6 +99,9 @@ inline double normal_force(double elastic, double approach, const PairLaw& law, 
     return share * force;
 }
 
+/// c of the node potential [docs/numerics.md, contact].
+inline constexpr double sigmoid = 100.0;
+
 /// Energy-conserving node potential of depth d (sigmoid of the paper family), per k_a A:
 ///     U = d u/sqrt(1+u^2),  f = u (2+u^2)/(1+u^2)^1.5,  u = 100 d/d*
 struct NodePotential {
