@@ -1,5 +1,7 @@
-// Contact of spheres with grids and polyhedra: one query of the distance at the centre.
+// Contact of spheres with grids and polyhedra: one query of the distance at the centre, or pressed on every wall of a grid.
+#include <bit>
 #include <cmath>
+#include <numbers>
 
 #include "core/parallel.h"
 #include "dem/detail/crossing.h"
@@ -9,19 +11,21 @@ namespace coral::dem {
 
 namespace {
 
-/// Slot of the wall with this normal (frame of the grid): within 37 degrees of it, or a new one.
+constexpr double same_wall = 0.8;  ///< cosine: places on a sphere within 37 degrees of each other share a friction spring
+
+/// Slot of the wall with this normal (frame of the grid), or a new one.
 int slot_of(Slots& slots, const Vec3& normal)
 {
-    for (int k = 0; k < Slots::count; ++k)
-        if ((slots.used >> k & 1) && slots.normal[k].dot(normal) > 0.8) {
+    for (int k = 0; k < Slots::nearest; ++k)
+        if ((slots.used >> k & 1) && slots.normal[k].dot(normal) > same_wall) {
             slots.normal[k] = normal;
             return k;
         }
     int k = 0;
-    while (k < Slots::count && (slots.used >> k & 1)) ++k;
-    if (k == Slots::count) {
+    while (k < Slots::nearest && (slots.used >> k & 1)) ++k;
+    if (k == Slots::nearest) {
         k = slots.next;
-        slots.next = std::uint8_t((slots.next + 1) % Slots::count);
+        slots.next = std::uint8_t((slots.next + 1) % Slots::nearest);
     }
     slots.used = std::uint8_t(slots.used | 1 << k);
     slots.spring[k].setZero();
@@ -29,11 +33,139 @@ int slot_of(Slots& slots, const Vec3& normal)
     return k;
 }
 
+/// What the walls of a grid press on a sphere, gathered by the place on the sphere: each has a dashpot and a friction spring.
+/// Only these are told apart by place; the elastic force is the plain sum over the surface.
+struct Places {
+    int count = 0;
+    int slot[Slots::count];  ///< that it had in the last step, or -1
+    Vec3 key[Slots::count], force[Slots::count];
+    double energy[Slots::count];
+
+    explicit Places(const Slots& slots)
+    {
+        for (int k = 0; k < Slots::count; ++k)
+            if (slots.used >> k & 1) open(slots.normal[k], k);
+    }
+    void open(const Vec3& normal, int from)
+    {
+        slot[count] = from;
+        key[count] = normal;
+        force[count].setZero();
+        energy[count++] = 0.0;
+    }
+    void add(const detail::Press& press)
+    {
+        const Vec3 direction = press.force.normalized();
+        int best = -1;
+        double nearest = count < Slots::count ? same_wall : -2.0;
+        for (int k = 0; k < count; ++k)
+            if (const double c = key[k].dot(direction); c > nearest) {
+                nearest = c;
+                best = k;
+            }
+        if (best < 0) open(direction, -1), best = count - 1;
+        force[best] += press.force;
+        energy[best] += press.energy;
+    }
+};
+
 }  // namespace
+
+/// The sphere of pair k pressed on the surface of its grid. \returns whether it touches
+bool World::Impl::press_on_walls(std::size_t k, double dt, GeneralForce& out, LoopSums& s, std::vector<Crossing>& crossing)
+{
+    SphereGridList& l = sphere_grids;
+    const std::size_t i = std::size_t(l.sphere[k]), j = std::size_t(l.grid[k]);
+    const Shape& body = *shapes[std::size_t(shape[j])];
+    const Vec3 offset = periodic(x[i] - x[j]);
+    const Vec3 local = q[j].conjugate() * offset / scale[j];
+    // The surface lies within a spacing of where the distances say, whatever ridges they have between it and here.
+    if (l.touch[k] == 0 && scale[j] * (body.distance_grid().sample(local) - body.distance_grid().spacing) > radius[i]) return false;
+
+    const detail::Facets& surface = *facets[std::size_t(shape[j])];
+    const PairLaw& pair = law(material[i], material[j]);
+    const double stiffness = pair.kn * scale[j] * scale[j] / (2.0 * std::numbers::pi * radius[i]);
+    Slots& slots = l.slots[k];
+    Places places(slots);
+    WallPress now;
+    detail::Press press;
+    for (Index f = l.facet_start[k]; f < l.facet_start[k + 1]; ++f) {
+        if (!surface.press(l.facet[std::size_t(f)], local, radius[i] / scale[j], press)) continue;
+        places.add(press);
+        now.push += stiffness * press.force;
+        now.energy += stiffness * scale[j] * press.energy;
+    }
+    s.elastic_normal += now.energy;
+
+    const Vec3 way = dt * (v[i] - v[j]);
+    const std::uint8_t before = l.touch[k];
+    const WallPress past = before ? l.press[k] : WallPress{};
+    const Vec3 drift = q[j].conjugate() * Vec3(way - dt * w[j].cross(offset - 0.5 * way));
+
+    const double root_mass = std::sqrt(1.0 / (inverse_mass[i] + inverse_mass[j]));
+    const double spin_limit = 1e-12 * radius[i] * radius[i];
+    Slots kept;
+    kept.next = slots.next;
+    std::uint8_t carried = 0;
+    bool clamped = false;
+    double total = 0.0;
+    out = {};
+    for (int p = 0; p < places.count; ++p) {
+        const double size = places.force[p].norm();
+        if (size * scale[j] * scale[j] <= spin_limit) continue;
+        const Vec3 local_normal = places.force[p] / size, n = q[j] * local_normal;
+        const double overlap = 2.0 * scale[j] * places.energy[p] / size;  // of a plane
+        const double approach = (v_end[j] + w[j].cross(offset) - v_end[i]).dot(n);
+        const double fn = normal_force(stiffness * size, approach, pair, root_mass, dt, s);
+        clamped = clamped || fn == 0.0;
+        const double arm_i = radius[i] - 0.5 * overlap;
+        const Vec3 arm_j = offset - arm_i * n;
+        const Vec3 velocity = v[i] - v[j] - arm_i * w[i].cross(n) - w[j].cross(arm_j);
+        const Vec3 slide = velocity - n.dot(velocity) * n;
+        const int at = places.slot[p] >= 0 ? places.slot[p] : std::countr_one(unsigned(kept.used | slots.used));
+        if (places.slot[p] >= 0) kept.spring[at] = slots.spring[at], carried = std::uint8_t(carried | 1 << at);
+        kept.used = std::uint8_t(kept.used | 1 << at);
+        kept.normal[at] = local_normal;
+        const Vec3 ft = tangential_force(pair, fn, n, slide, 0.5 * (w[i] + w[j]).dot(n), root_mass, dt, 1.0, kept.spring[at], s);
+        out.normal_force += fn * n;
+        out.tangential_force += ft;
+        out.torque_a -= arm_i * n.cross(ft);
+        out.torque_b -= arm_j.cross(fn * n + ft);
+        out.arm -= (fn * arm_i) * n;
+        total += fn;
+        out.overlap = std::max(out.overlap, overlap);
+        ++out.points;
+    }
+    for (int slot = 0; slot < Slots::count; ++slot)
+        if ((slots.used & ~carried) >> slot & 1) s.friction += 0.5 * pair.kt * slots.spring[slot].squaredNorm();
+    slots = kept;
+    l.touch[k] = out.points == 0 ? 0 : clamped ? 2 : 1;
+    l.press[k] = now;
+
+    // Work of the trapezoid of both ends against the change of what is stored: they differ where walls open and close (see WorkError).
+    const Vec3 sum = now.push + past.push;
+    const double strength = sum.norm(), error = past.energy - now.energy - 0.5 * sum.dot(drift) + past.owed;
+    if (dt > 0.0 && before != 2 && !clamped && strength > 0.0) {
+        if (std::abs(error) > 1e-6 * (past.energy + now.energy)) {
+            crossing.push_back({Index(i), Index(j), error, q[j] * Vec3(sum / strength), offset});
+            if (out.points > 0) crossing.back().press = Index(k);
+        } else {
+            l.press[k].owed = error;
+        }
+    }
+    if (out.points == 0) return false;
+    out.a = Index(i);
+    out.b = Index(j);
+    if (total > 0.0) out.arm /= total;
+    s.max_overlap = std::max(s.max_overlap, out.overlap / radius[i]);
+    s.deep += out.overlap > options.overlap_cap * radius[i];
+    return true;
+}
 
 void World::Impl::sphere_grid_loop(double dt)
 {
     SphereGridList& l = sphere_grids;
+    const bool all_walls = options.sphere_scheme == SphereScheme::walls;
     const std::size_t base = (spheres.rows.size() + row_grain - 1) / row_grain + (sphere_walls.body.size() + entry_grain - 1) / entry_grain;
     parallel_blocks(l.sphere.size(), grid_grain, [&](std::size_t first, std::size_t last) {
         const std::size_t block = first / grid_grain;
@@ -43,8 +175,12 @@ void World::Impl::sphere_grid_loop(double dt)
         GeneralForce* out = begin;
         for (std::size_t k = first; k < last; ++k) {
             const std::size_t i = std::size_t(l.sphere[k]), j = std::size_t(l.grid[k]);
-            const Vec3 offset = periodic(x[i] - x[j]);
             const detail::DistanceField field(*shapes[std::size_t(shape[j])]);
+            if (all_walls && field.grid) {
+                if (press_on_walls(k, dt, *out, s, crossing)) ++out;
+                continue;
+            }
+            const Vec3 offset = periodic(x[i] - x[j]);
             Vec3 local_gradient;
             const Vec3 local = q[j].conjugate() * offset;
             const double overlap = radius[i] - scale[j] * field.distance_and_gradient(local / scale[j], local_gradient);

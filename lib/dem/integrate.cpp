@@ -227,8 +227,8 @@ void World::Impl::correct_crossings()
                 inverse += compliance(std::size_t(c.b), c.arm_b, c.normal);
             }
             const double speed = relative.dot(c.normal);
-            if (c.pair >= 0 && speed * speed < 20.0 * std::abs(c.energy) * inverse) {
-                nodes.owed[std::size_t(c.pair)] = c.energy;
+            if ((c.pair >= 0 || c.press >= 0) && speed * speed < 20.0 * std::abs(c.energy) * inverse) {
+                (c.pair >= 0 ? nodes.owed[std::size_t(c.pair)] : sphere_grids.press[std::size_t(c.press)].owed) = c.energy;
                 continue;
             }
             if (speed == 0.0) continue;

@@ -89,6 +89,8 @@ void make_sphere_grid_list(World::Impl& world, const std::vector<BroadPair>& pai
         if (a != b) mixed.push_back(a ? BroadPair{pair.b, pair.a} : pair);
     }
     std::sort(mixed.begin(), mixed.end(), [](const BroadPair& s, const BroadPair& t) { return key_of(s.a, s.b) < key_of(t.a, t.b); });
+    const bool all_walls = world.options.sphere_scheme == SphereScheme::walls;
+    if (all_walls) l.facet_start.push_back(0);
     std::size_t k = 0;
     for (const BroadPair& pair : mixed) {
         const std::size_t i = std::size_t(pair.a), j = std::size_t(pair.b);
@@ -111,6 +113,10 @@ void make_sphere_grid_list(World::Impl& world, const std::vector<BroadPair>& pai
         const bool same = k < old.sphere.size() && key_of(old.sphere[k], old.grid[k]) == key;
         l.touch.push_back(same ? old.touch[k] : std::uint8_t{0});
         l.slots.push_back(same ? old.slots[k] : Slots{});
+        if (!all_walls) continue;
+        l.press.push_back(same ? old.press[k] : WallPress{});
+        if (shape.kind() == ShapeKind::grid) world.facets_of(world.shape[j]).gather(local / scale, within / scale, l.facet);
+        l.facet_start.push_back(Index(l.facet.size()));
     }
     l.out.resize(l.sphere.size());
 }
@@ -225,6 +231,14 @@ void make_node_list(World::Impl& world, const std::vector<BroadPair>& pairs, dou
 }
 
 }  // namespace
+
+const detail::Facets& World::Impl::facets_of(Index shape_id)
+{
+    facets.resize(shapes.size());
+    std::shared_ptr<const detail::Facets>& made = facets[std::size_t(shape_id)];
+    if (!made) made = std::make_shared<const detail::Facets>(shapes[std::size_t(shape_id)]->distance_grid());
+    return *made;
+}
 
 void World::Impl::make_lists()
 {

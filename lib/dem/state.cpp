@@ -8,7 +8,7 @@ namespace coral::dem {
 
 namespace {
 
-constexpr std::uint64_t magic = 0x3230'4d45'4452'4f43;  // "CORDEM02"
+constexpr std::uint64_t magic = 0x3330'4d45'4452'4f43;  // "CORDEM03"
 constexpr std::uint64_t magic_name = 0x0000'ffff'ffff'ffff;  // the part without the version
 
 std::uint64_t checksum(std::span<const std::uint8_t> bytes)
@@ -77,7 +77,7 @@ void visit_state(World::Impl& m, Archive& io)
     SphereWallList& w = m.sphere_walls;
     io(w.body), io(w.wall), io(w.feature), io(w.touch), io(w.spring), io(w.out);
     SphereGridList& g = m.sphere_grids;
-    io(g.sphere), io(g.grid), io(g.touch), io(g.slots), io(g.out);
+    io(g.sphere), io(g.grid), io(g.touch), io(g.slots), io(g.press), io(g.facet_start), io(g.facet), io(g.out);
     NodeList& n = m.nodes;
     io(n.slave), io(n.master), io(n.start), io(n.node), io(n.spring), io(n.touch), io(n.gradient), io(n.arm), io(n.force), io(n.depth), io(n.clearance), io(n.owed), io(n.share), io(n.out);
     io(m.out_count[0]), io(m.out_count[1]), io(m.out_count[2]), io(m.block_sums), io(m.sums), io(m.time);
@@ -115,6 +115,9 @@ void World::restore(std::span<const std::uint8_t> state)
     visit_state(m, in);
     for (std::size_t i = 0; i < m.x.size(); ++i) m.update_mass(i);
     m.crossings.resize(std::max(m.crossings.size(), m.block_sums.size()));
+    if (m.sphere_grids.press.size() == m.sphere_grids.grid.size())
+        for (const Index grid : m.sphere_grids.grid)
+            if (m.shapes[std::size_t(m.shape[std::size_t(grid)])]->kind() == ShapeKind::grid) m.facets_of(m.shape[std::size_t(grid)]);
 }
 
 }  // namespace coral::dem

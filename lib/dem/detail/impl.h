@@ -8,6 +8,7 @@
 
 #include "dem/detail/contact_law.h"
 #include "dem/detail/distance_field.h"
+#include "dem/detail/facets.h"
 #include "dem/detail/plate.h"
 #include "dem/world.h"
 
@@ -51,6 +52,7 @@ struct Crossing {
     Vec3 normal, arm_b;
     Vec3 arm_a = Vec3::Zero();  ///< beside the normal: zero for spheres
     Index pair = -1;            ///< of the node list, that keeps what cannot be given yet
+    Index press = -1;           ///< of the list of spheres and grids, likewise
 };
 
 /// Half list of sphere pairs in compressed rows: partners of sphere i are other[row[i]..row[i+1]), ascending.
@@ -69,18 +71,27 @@ struct SphereWallList {
     std::vector<PointForce> out;
 };
 
-/// Up to three friction springs per pair, keyed by the normal in the frame of the grid: a sphere that rests on two walls of a groove
+/// Friction springs of a pair, keyed by the normal in the frame of the grid: a sphere that rests on two walls of a groove
 /// changes its nearest wall from step to step, and each wall keeps its spring.
 struct Slots {
-    static constexpr int count = 3;
-    Vec3 spring[count] = {Vec3::Zero(), Vec3::Zero(), Vec3::Zero()};
-    Vec3 normal[count] = {Vec3::Zero(), Vec3::Zero(), Vec3::Zero()};
+    static constexpr int nearest = 3;  ///< as many are used where only the nearest wall pushes
+    static constexpr int count = 6;    ///< a ball in a ring touches it all around
+    Vec3 spring[count] = {Vec3::Zero(), Vec3::Zero(), Vec3::Zero(), Vec3::Zero(), Vec3::Zero(), Vec3::Zero()};
+    Vec3 normal[count] = {Vec3::Zero(), Vec3::Zero(), Vec3::Zero(), Vec3::Zero(), Vec3::Zero(), Vec3::Zero()};
     std::uint8_t used = 0, next = 0;
+};
+/// Of the last step, where all walls push (SphereScheme::walls).
+struct WallPress {
+    Vec3 push = Vec3::Zero();  ///< elastic force on the sphere, frame of the grid [N]
+    double energy = 0.0;       ///< stored [J]
+    double owed = 0.0;         ///< error of the work that waits for correction [J]
 };
 struct SphereGridList {
     std::vector<Index> sphere, grid;
     std::vector<std::uint8_t> touch;
     std::vector<Slots> slots;
+    std::vector<WallPress> press;           ///< these three: empty unless all walls push
+    std::vector<Index> facet_start, facet;  ///< triangles within the skin; facet_start has one more entry
     std::vector<GeneralForce> out;
 };
 
@@ -108,6 +119,7 @@ constexpr std::size_t row_grain = 1024, entry_grain = 2048, grid_grain = 512, no
 struct World::Impl {
     WorldOptions options;
     std::vector<std::shared_ptr<const Shape>> shapes;
+    std::vector<std::shared_ptr<const detail::Facets>> facets;  ///< per shape; made when a sphere comes near
     std::vector<Material> materials;
     std::vector<PairLaw> laws;  ///< materials x materials
     std::vector<WallData> walls;
@@ -169,6 +181,7 @@ struct World::Impl {
 
     // lists.cpp
     void make_lists();
+    const detail::Facets& facets_of(Index shape_id);
     void drop_contacts(Index body);
     bool lists_expired() const;
 
@@ -177,6 +190,7 @@ struct World::Impl {
     void sphere_loop(double dt);
     void sphere_wall_loop(double dt);
     void sphere_grid_loop(double dt);
+    bool press_on_walls(std::size_t k, double dt, GeneralForce& out, LoopSums& s, std::vector<Crossing>& crossing);
     void node_loop(double dt);
     void sum_forces();
     void refresh_forces();
