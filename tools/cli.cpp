@@ -6,6 +6,7 @@
 #include <spdlog/spdlog.h>
 #include <toml++/toml.h>
 
+#include <csignal>
 #include <filesystem>
 #include <new>
 
@@ -17,6 +18,8 @@
 
 namespace coral::cli {
 namespace {
+
+volatile std::sig_atomic_t stop_signal = 0;
 
 struct CommonOptions {
     int threads = 0;
@@ -230,6 +233,14 @@ int run_tool(int argc, char** argv, const std::string& name, const std::string& 
         return report(name, error.what(), 1);
     }
 }
+
+void catch_stop_signals()
+{
+    std::signal(SIGINT, [](int) { stop_signal = 1; });
+    std::signal(SIGTERM, [](int) { stop_signal = 1; });
+}
+
+bool stop_asked() { return stop_signal != 0; }
 
 void print_summary(const Context& context, const nlohmann::ordered_json& json, const std::string& human)
 {

@@ -71,6 +71,10 @@ struct Context {
 int run_tool(int argc, char** argv, const std::string& name, const std::string& description, const std::function<void(Options&)>& declare,
              const std::function<void(const Context&)>& run, std::uint64_t* seed = nullptr);
 
+/// From now on SIGINT and SIGTERM only make stop_asked() true, so that a long run can write a checkpoint and end by itself.
+void catch_stop_signals();
+bool stop_asked();
+
 /// Versions of the libraries in this build, one a line (for --version and bug reports).
 std::string library_versions();
 

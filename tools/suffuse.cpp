@@ -3,16 +3,12 @@
 
 #include <spdlog/spdlog.h>
 
-#include <atomic>
-#include <csignal>
 #include <limits>
 
 #include "core/text.h"
 #include "suffusion/run.h"
 
 namespace {
-
-volatile std::sig_atomic_t stop_asked = 0;
 
 struct Options {
     std::string path;
@@ -68,14 +64,13 @@ nlohmann::ordered_json json_summary(const coral::suffusion::RunSummary& s)
 
 void run(const Options& o, const coral::cli::Context& context)
 {
-    std::signal(SIGINT, [](int) { stop_asked = 1; });
-    std::signal(SIGTERM, [](int) { stop_asked = 1; });
+    coral::cli::catch_stop_signals();
     coral::suffusion::RunOptions options;
     options.until = o.until;
     options.resume = o.resume;
     options.timing = !o.no_timing;
     options.record = context.record;
-    options.interrupted = [] { return stop_asked != 0; };
+    options.interrupted = coral::cli::stop_asked;
     options.message = [](const std::string& text) { spdlog::info("{}", text); };
     const coral::suffusion::RunSummary summary = coral::suffusion::run_case(o.path, options);
     if (summary.interrupted) spdlog::warn("interrupted at t = {} s; checkpoint written, go on with: suffuse {} --resume", coral::to_text(summary.time), o.path);

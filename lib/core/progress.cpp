@@ -39,8 +39,9 @@ double seconds_between(std::chrono::steady_clock::time_point a, std::chrono::ste
 
 }  // namespace
 
-Progress::Progress(std::string what, double total)
-    : what_(std::move(what)), total_(total), start_(std::chrono::steady_clock::now()), last_(start_)
+Progress::Progress(std::string what, double total, double done)
+    : what_(std::move(what)), total_(total), first_(total > 0 ? std::clamp(done / total, 0.0, 1.0) : 0), tenth_(int(first_ * 10)), start_(std::chrono::steady_clock::now()),
+      last_(start_)
 {
 }
 
@@ -58,7 +59,7 @@ void Progress::update(double done, const std::string& detail)
     if (redraw ? seconds_between(last_, now) < 0.1 && share < 1 : static_cast<int>(share * 10) <= tenth_) return;
     last_ = now;
     tenth_ = static_cast<int>(share * 10);
-    const std::string left = share > 0 && elapsed > 0.5 ? ", " + duration(elapsed * (1 - share) / share) + " left" : "";
+    const std::string left = share > first_ && elapsed > 0.5 ? ", " + duration(elapsed * (1 - share) / (share - first_)) + " left" : "";
     std::fprintf(stderr, "%s%s %3.0f %%%s%s%s%s", redraw ? "\r\033[K" : "", what_.c_str(), 100 * share, left.c_str(),
                  detail.empty() ? "" : ", ", detail.c_str(), redraw ? "" : "\n");
     std::fflush(stderr);

@@ -9,7 +9,8 @@ namespace coral {
 class Progress {
 public:
     /// \param total  amount of work in any unit; \param what  short noun shown in front ("settling", "grains")
-    Progress(std::string what, double total);
+    /// \param done   what an earlier run did of it: the time left counts from there
+    Progress(std::string what, double total, double done = 0);
     ~Progress();
     /// Work done so far; `detail` is shown after rate and time left.
     void update(double done, const std::string& detail = {});
@@ -20,7 +21,7 @@ public:
 
 private:
     std::string what_;
-    double total_;
+    double total_, first_;
     int tenth_ = 0;
     bool finished_ = false;
     std::chrono::steady_clock::time_point start_, last_;
