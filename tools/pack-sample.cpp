@@ -18,7 +18,8 @@ namespace {
 
 struct Options {
     std::filesystem::path input, output, grains, psd_figure;
-    double scale = 1;
+    double scale = 1, checkpoint_every = 300;
+    bool resume = false;
 };
 
 void declare(cli::Options& options, Options& o)
@@ -28,10 +29,18 @@ void declare(cli::Options& options, Options& o)
     options.add("--grains", o.grains, "Level-set grains, .vdb, in place of the files that the specification names").existing_file();
     options.add("--scale", o.scale, "Factor on the lengths of shapes that keep the size of their file [-]");
     options.add("--psd-figure", o.psd_figure, "Picture of the gradation, .png or .svg (needs gnuplot)");
+    options.flag("--resume", o.resume, "Go on from <output>.checkpoint, which a stopped or killed run leaves");
+    options.quantity("--checkpoint-every", o.checkpoint_every, Dimension::time, "Wall time between checkpoints");
 }
 
 /// JSON has no NaN: what does not exist is null.
 nlohmann::ordered_json number(double value) { return std::isfinite(value) ? nlohmann::ordered_json(value) : nlohmann::ordered_json(nullptr); }
+
+/// Wall time of each phase, all parts of a resumed packing together.
+nlohmann::ordered_json seconds_of(const pack::PackReport& r)
+{
+    return {{"loading", r.loading_seconds}, {"pouring", r.pouring_seconds}, {"compression", r.compression_seconds}, {"relaxation", r.relaxation_seconds}};
+}
 
 nlohmann::ordered_json to_json(const pack::Sample& sample, const pack::PackReport& report)
 {
@@ -68,8 +77,7 @@ nlohmann::ordered_json to_json(const pack::Sample& sample, const pack::PackRepor
     json["steps"] = report.steps;
     json["dem_step"] = s.dem_step;
     json["simulated_time"] = report.simulated_time;
-    json["seconds"] = {{"loading", report.loading_seconds}, {"pouring", report.pouring_seconds},
-                       {"compression", report.compression_seconds}, {"relaxation", report.relaxation_seconds}};
+    json["seconds"] = seconds_of(report);
     json["warnings"] = report.warnings;
     return json;
 }
@@ -101,6 +109,27 @@ std::string to_text(const pack::Sample& sample, const pack::PackReport& report, 
     return text;
 }
 
+pack::PackControl control_of(const Options& o, const std::filesystem::path& checkpoint)
+{
+    cli::catch_stop_signals();
+    pack::PackControl control;
+    control.checkpoint = checkpoint;
+    control.resume = o.resume;
+    control.checkpoint_every = o.checkpoint_every;
+    control.interrupted = cli::stop_asked;
+    control.message = [](const std::string& text) { spdlog::info("{}", text); };
+    return control;
+}
+
+void report_stop(const cli::Context& context, const pack::PackReport& report, const std::filesystem::path& checkpoint)
+{
+    const bool kept = std::filesystem::exists(checkpoint);
+    spdlog::warn("interrupted; {}", kept ? checkpoint.string() + " is written, give the same command with --resume to go on" : "nothing had been packed yet");
+    nlohmann::ordered_json json{{"complete", false}, {"interrupted", true}, {"seconds", seconds_of(report)}};
+    if (kept) json["checkpoint"] = checkpoint.string();
+    cli::print_summary(context, json, "stopped before the end" + std::string(kept ? " (go on with --resume)" : ""));
+}
+
 void run(const Options& o, const cli::Context& context, std::uint64_t seed)
 {
     if (!(o.scale > 0)) throw UsageError("--scale", "must be greater than zero, is " + coral::to_text(o.scale), "1 keeps the size of the file");
@@ -109,15 +138,24 @@ void run(const Options& o, const cli::Context& context, std::uint64_t seed)
     if (!std::filesystem::is_directory(o.output.has_parent_path() ? o.output.parent_path() : "."))
         throw UsageError(o.output.string(), "its folder does not exist", "make the folder first");
     if (!o.psd_figure.empty()) tool::check_psd_figure(o.psd_figure);
+    if (o.checkpoint_every < 0) throw UsageError("--checkpoint-every", "is negative", "take a time such as 300s");
+    const std::filesystem::path checkpoint = o.output.string() + ".checkpoint";
     pack::PackReport report;
-    pack::Sample sample = pack::pack(spec, seed, report);
+    pack::Sample sample = pack::pack(spec, seed, report, control_of(o, checkpoint));
+    if (report.interrupted) {
+        report_stop(context, report, checkpoint);
+        return;
+    }
     RecordEntry entry = context.record;
+    for (const char* option : {"resume", "checkpoint-every"}) entry.options.erase(option);
     if (!o.grains.empty()) entry.options["grains"] = o.grains.filename().string();  // no folders in a history
     entry.options.erase("psd-figure");  // makes no difference to the sample
     entry.options["specification"] = read_text_file(o.input);  // a file name alone would not repeat the run
     if (std::isfinite(report.relative_density)) entry.options["relative_density"] = coral::to_text(report.relative_density);
     sample.history.push_back(std::move(entry));
     pack::write_sample(sample, o.output);
+    std::error_code ignored;
+    std::filesystem::remove(checkpoint, ignored);
     if (!o.psd_figure.empty()) tool::draw_psd(sample, o.psd_figure);
     for (const std::string& warning : report.warnings) spdlog::warn("{}", warning);
     cli::print_summary(context, to_json(sample, report), to_text(sample, report, o.output));

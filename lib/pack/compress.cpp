@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <cmath>
+#include <cstdio>
 
 #include "core/error.h"
 #include "core/progress.h"
@@ -104,12 +104,6 @@ void set_frictions(dem::World& world, const Spec& spec, double friction)
         world.set_friction(int(m), friction >= 0 ? friction : spec.materials[m].friction);
 }
 
-std::string describe(double pressure, const MotionWindow::Means& means)
-{
-    return "mean pressure " + format_quantity(std::round(pressure), Dimension::pressure) + ", unbalanced ratio " +
-           to_text(std::round(1e4 * means.unbalanced_ratio) / 1e4);
-}
-
 /// Sets the speeds of all pairs for the next few steps. Returns the worst relative error of a pressure; `mean` is their mean.
 double serve(dem::World& world, const Box& box, const Spec& spec, const std::array<int, 6>& contacts, double stiffness, double mass,
              bool& lid_touches, double& mean)
@@ -133,33 +127,39 @@ double serve(dem::World& world, const Box& box, const Spec& spec, const std::arr
     return worst;
 }
 
-bool to_pressure(dem::World& world, const Box& box, const Spec& spec)
+bool to_pressure(dem::World& world, const Box& box, const Spec& spec, Keeper& keeper, LapClock& clock)
 {
     const Compression& rule = spec.compression;
-    const double dt = step_of(world, spec), start = world.time(), kn = stiffest(spec), mass = total_mass(world),
-                 slow = settled_speed(world, spec);
-    set_frictions(world, spec, rule.friction);
-    bool own_friction = rule.friction < 0, lid_touches = false;
+    PackState& state = keeper.state;
+    const double dt = step_of(world, spec), kn = stiffest(spec), mass = total_mass(world), slow = settled_speed(world, spec);
+    state.own_friction = state.own_friction || rule.friction < 0;
+    set_frictions(world, spec, state.own_friction ? -1 : rule.friction);
     Progress progress("compressing", 1);
+    Approach approach;
     MotionWindow window(world);
-    while (world.time() - start < rule.time_limit) {
+    while (world.time() - state.start < rule.time_limit) {
+        clock.lap();
+        keeper.visit(world);
         double worst = 0, mean = 0;
         const auto contacts = wall_contacts(world, box);
         window.start(world);
         for (int check = 0; check < checks_per_window; ++check) {
             double now = 0;
-            worst = std::max(worst, serve(world, box, spec, contacts, kn, mass, lid_touches, now));
+            worst = std::max(worst, serve(world, box, spec, contacts, kn, mass, state.lid_touches, now));
             mean += now / checks_per_window;
             step_some(world, dt, rule.drag);
         }
         check_sound(world, box);
         const MotionWindow::Means means = window.means(world);
-        progress.update(std::min(mean / rule.pressure, 0.99), describe(mean, means));
-        if (!own_friction && worst < 0.1) {
+        const double rest = std::max({worst / rule.tolerance, means.unbalanced_ratio / rule.unbalanced_ratio, means.kinetic_ratio / (10 * rule.kinetic_ratio), means.speed / slow});
+        const double share = 0.7 * std::clamp(mean / rule.pressure, 0.0, 1.0) + (worst < 0.1 ? 0.3 * approach.share(rest) : 0.0);
+        progress.update(std::clamp(share, (world.time() - state.start) / rule.time_limit, 0.99),
+                        "mean pressure " + format_quantity(std::round(mean), Dimension::pressure) + ", " + describe(means));
+        if (!state.own_friction && worst < 0.1) {
             set_frictions(world, spec, -1);
-            own_friction = true;
+            state.own_friction = true;
         }
-        if (own_friction && worst < rule.tolerance && means.unbalanced_ratio < rule.unbalanced_ratio && means.kinetic_ratio < 10 * rule.kinetic_ratio &&
+        if (state.own_friction && worst < rule.tolerance && means.unbalanced_ratio < rule.unbalanced_ratio && means.kinetic_ratio < 10 * rule.kinetic_ratio &&
             means.speed < slow) {
             progress.finish();
             return true;
@@ -168,10 +168,10 @@ bool to_pressure(dem::World& world, const Box& box, const Spec& spec)
     return false;
 }
 
-bool to_void_ratio(dem::World& world, const Box& box, const Spec& spec, double apparent_volume)
+bool to_void_ratio(dem::World& world, const Box& box, const Spec& spec, double apparent_volume, Keeper& keeper, LapClock& clock)
 {
     const Compression& rule = spec.compression;
-    const double dt = step_of(world, spec), start = world.time(), target = apparent_volume * (1 + rule.void_ratio);
+    const double dt = step_of(world, spec), start = keeper.state.start, target = apparent_volume * (1 + rule.void_ratio);
     const double first = (box.upper(world) - box.lower(world)).prod();
     if (first < target)
         throw Error("compression", "the poured sample has void ratio " + to_text(first / apparent_volume - 1) + ", below the target of " + to_text(rule.void_ratio),
@@ -185,20 +185,17 @@ bool to_void_ratio(dem::World& world, const Box& box, const Spec& spec, double a
             progress.finish();
             return true;
         }
+        clock.lap();
+        keeper.visit(world);
         // relative closing rate of every moving edge; the last part takes a few hundred steps
         const double edges = rule.lateral ? 3 : 1;
         const double rate = std::min(2 * rule.max_velocity / (rule.lateral ? size.maxCoeff() : size.z()), excess / (edges * 500 * dt));
         for (int axis = rule.lateral ? 0 : 2; axis < 3; ++axis) set_pair_speed(world, box, axis, 0.5 * rate * size[axis], rule.lateral);
         step_some(world, dt, rule.drag);
         check_sound(world, box);
-        progress.update(first > target ? std::min((first - volume) / (first - target), 0.99) : 0.99);
+        progress.update(first > target ? std::min((first - volume) / (first - target), 0.99) : 0.99, "void ratio " + to_text(std::round(1e4 * (volume / apparent_volume - 1)) / 1e4));
     }
     return false;
-}
-
-double seconds_since(std::chrono::steady_clock::time_point start)
-{
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
 }  // namespace
@@ -219,44 +216,55 @@ double Box::pressure(const dem::World& world, int i) const
     return -world.wall_force(first + i).dot(world.wall_normal(first + i)) * size[i / 2] / size.prod();
 }
 
-void compress(dem::World& world, const Box& box, const Spec& spec, double apparent_volume, PackReport& report)
+std::string describe(const MotionWindow::Means& means)
 {
-    if (spec.compression.target == CompressionTarget::none) return;
-    const auto clock = std::chrono::steady_clock::now();
-    report.compressed = spec.compression.target == CompressionTarget::pressure ? to_pressure(world, box, spec)
-                                                                               : to_void_ratio(world, box, spec, apparent_volume);
-    stop_walls(world, box);
-    if (!report.compressed)
-        report.warnings.push_back("the compression ended at its time limit of " + to_text(spec.compression.time_limit) +
-                                  " s before its target was met; raise [compression] time_limit or tolerance");
-    report.compression_seconds = seconds_since(clock);
+    char text[80];
+    std::snprintf(text, sizeof text, "unbalanced ratio %.2g, kinetic ratio %.1e", means.unbalanced_ratio, means.kinetic_ratio);
+    return text;
 }
 
-MotionWindow::Means relax(dem::World& world, const Spec& spec, PackReport& report)
+double Approach::share(double ratio)
 {
-    const auto clock = std::chrono::steady_clock::now();
+    if (!(ratio > 1)) return 1;
+    first_ = std::max(first_, ratio);
+    return 1 - std::log(ratio) / std::log(first_);
+}
+
+void compress(dem::World& world, const Box& box, const Spec& spec, double apparent_volume, Keeper& keeper)
+{
+    if (spec.compression.target == CompressionTarget::none) return;
+    PackReport& report = keeper.state.report;
+    LapClock clock(report.compression_seconds);
+    report.compressed = spec.compression.target == CompressionTarget::pressure ? to_pressure(world, box, spec, keeper, clock)
+                                                                               : to_void_ratio(world, box, spec, apparent_volume, keeper, clock);
+    stop_walls(world, box);
+}
+
+MotionWindow::Means relax(dem::World& world, const Spec& spec, Keeper& keeper)
+{
+    PackReport& report = keeper.state.report;
+    LapClock clock(report.relaxation_seconds);
     const Compression& rule = spec.compression;
-    const double dt = step_of(world, spec), start = world.time();
+    const double dt = step_of(world, spec), start = keeper.state.start;
     set_frictions(world, spec, -1);
-    Progress progress("relaxing", rule.relaxation_limit);
+    Progress progress("relaxing", 1);
+    Approach approach;
     const double slow = settled_speed(world, spec);
     MotionWindow window(world);
     MotionWindow::Means means;
     report.relaxed = false;
     while (!report.relaxed && world.time() - start < rule.relaxation_limit) {
+        clock.lap();
+        keeper.visit(world);
         window.start(world);
         for (int check = 0; check < checks_per_window; ++check) step_some(world, dt, rule.drag);
         means = window.means(world);
         report.relaxed = means.unbalanced_ratio < rule.unbalanced_ratio && means.kinetic_ratio < rule.kinetic_ratio &&
                          means.speed < slow;
-        progress.update(std::min(world.time() - start, 0.99 * rule.relaxation_limit),
-                        "unbalanced ratio " + to_text(std::round(1e5 * means.unbalanced_ratio) / 1e5));
+        const double rest = std::max({means.unbalanced_ratio / rule.unbalanced_ratio, means.kinetic_ratio / rule.kinetic_ratio, means.speed / slow});
+        progress.update(std::min(std::max((world.time() - start) / rule.relaxation_limit, approach.share(rest)), 0.99), describe(means));
     }
     progress.finish();
-    if (!report.relaxed)
-        report.warnings.push_back("the final relaxation ended at its time limit of " + to_text(rule.relaxation_limit) +
-                                  " s; raise [compression] relaxation_limit");
-    report.relaxation_seconds = seconds_since(clock);
     return means;
 }
 

@@ -1,9 +1,8 @@
 #include "pack/pack.h"
 
-#include <chrono>
-
 #include "core/text.h"
 #include "pack/criteria.h"
+#include "pack/detail/keeper.h"
 #include "pack/detail/phases.h"
 #include "pack/sample_world.h"
 
@@ -18,16 +17,32 @@ std::vector<Wall> box_walls(const Eigen::Vector3d& size)
             {"y+", size, -Eigen::Vector3d::UnitY()}, {"z-", zero, Eigen::Vector3d::UnitZ()},  {"z+", size, -Eigen::Vector3d::UnitZ()}};
 }
 
-}  // namespace
-
-Sample pack(const Spec& spec, std::uint64_t seed, PackReport& report)
+void collect_warnings(const Spec& spec, PackReport& report)
 {
-    const auto clock = std::chrono::steady_clock::now();
-    report = {};
     report.warnings = spec.warnings;
-    Grains grains = make_grains(spec, seed);
-    report.loading_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - clock).count();
-    detail::pour(grains, spec, seed, report);
+    if (!report.compressed)
+        report.warnings.push_back("the compression ended at its time limit of " + to_text(spec.compression.time_limit) +
+                                  " s before its target was met; raise [compression] time_limit or tolerance");
+    if (!report.relaxed)
+        report.warnings.push_back("the final relaxation ended at its time limit of " + to_text(spec.compression.relaxation_limit) +
+                                  " s; raise [compression] relaxation_limit");
+    if (report.unsettled_layers > 0)
+        report.warnings.push_back(std::to_string(report.unsettled_layers) + " of " + std::to_string(report.layers) +
+                                  " batches hit [dropping] time_limit before they had settled");
+    if (report.relative_density < 0 || report.relative_density > 1)
+        report.warnings.push_back("relative density " + to_text(100 * report.relative_density) + " %: the void ratio lies outside [density] e_min and e_max");
+}
+
+/// All phases from where the keeper stands.
+Sample pack(const Spec& spec, std::uint64_t seed, detail::Keeper& keeper)
+{
+    PackState& state = keeper.state;
+    PackReport& report = state.report;
+    Grains grains = [&] {
+        const detail::LapClock clock(report.loading_seconds);
+        return make_grains(spec, seed, [&] { keeper.visit(); });
+    }();
+    if (!keeper.skips(Phase::pouring)) detail::pour(grains, spec, seed, keeper);
 
     Sample& sample = grains.sample;
     sample.walls = box_walls(sample.size);
@@ -36,25 +51,44 @@ Sample pack(const Spec& spec, std::uint64_t seed, PackReport& report)
     dem::World world(options);
     const SampleIds ids = add_sample(world, sample);
     const detail::Box box{ids.walls.front()};
-    // contacts have just become stiffer: what overlap the soft ones held would burst the packing
-    constexpr double harmless_overlap = 2e-4;
-    world.relax(harmless_overlap, 200);
-    double apparent = 0;
-    for (const Particle& p : sample.particles) apparent += apparent_volume(sample, p);
-    detail::compress(world, box, spec, apparent, report);
-    const detail::MotionWindow::Means rest = detail::relax(world, spec, report);
+    if (keeper.skips(Phase::pouring)) {
+        keeper.restore(world);
+    } else {
+        // contacts have just become stiffer: what overlap the soft ones held would burst the packing
+        constexpr double harmless_overlap = 2e-4;
+        world.relax(harmless_overlap, 200);
+        state.phase = Phase::compression;
+        state.start = world.time();
+    }
+    if (state.phase == Phase::compression) {
+        double apparent = 0;
+        for (const Particle& p : sample.particles) apparent += apparent_volume(sample, p);
+        detail::compress(world, box, spec, apparent, keeper);
+        state.phase = Phase::relaxation;
+        state.start = world.time();
+    }
+    const detail::MotionWindow::Means rest = detail::relax(world, spec, keeper);
     report.steps += world.counters().steps;
     report.simulated_time += world.time();
-    if (report.unsettled_layers > 0)
-        report.warnings.push_back(std::to_string(report.unsettled_layers) + " of " + std::to_string(report.layers) +
-                                  " batches hit [dropping] time_limit before they had settled");
     detail::measure(world, box, rest, spec.dem_step > 0 ? spec.dem_step : world.auto_time_step(), report.steps, sample);
-    if (spec.density) {
-        report.relative_density = relative_density(sample.statistics.void_ratio, spec.density->e_min, spec.density->e_max);
-        if (report.relative_density < 0 || report.relative_density > 1)
-            report.warnings.push_back("relative density " + to_text(100 * report.relative_density) + " %: the void ratio lies outside [density] e_min and e_max");
-    }
+    if (spec.density) report.relative_density = relative_density(sample.statistics.void_ratio, spec.density->e_min, spec.density->e_max);
+    collect_warnings(spec, report);
     return std::move(sample);
+}
+
+}  // namespace
+
+Sample pack(const Spec& spec, std::uint64_t seed, PackReport& report, const PackControl& control)
+{
+    detail::Keeper keeper(control, spec, seed);
+    Sample sample;
+    try {
+        sample = pack(spec, seed, keeper);
+    } catch (const detail::Stopped&) {
+        keeper.state.report.interrupted = true;
+    }
+    report = keeper.state.report;
+    return sample;
 }
 
 }  // namespace coral::pack

@@ -2,6 +2,8 @@
 /// \file pack/pack.h
 /// The whole packing: grains drawn, poured in alternating layers, compressed, relaxed and measured.
 #include <cstdint>
+#include <filesystem>
+#include <functional>
 #include <limits>
 #include <string>
 #include <vector>
@@ -21,7 +23,18 @@ struct PackReport {
     double pouring_seconds = 0, compression_seconds = 0, relaxation_seconds = 0, loading_seconds = 0;  ///< wall time
     double relative_density = std::numeric_limits<double>::quiet_NaN();  ///< of the void ratio, voids included [-]; NaN without [density]
     double simulated_time = 0;  ///< of all phases [s]
+    bool interrupted = false;   ///< stopped before its end; the checkpoint, if one is kept, goes on from here
     std::vector<std::string> warnings;
+};
+
+/// What goes on around a packing.
+struct PackControl {
+    std::filesystem::path checkpoint;  ///< file that keeps the state of the packing; empty: none
+    bool resume = false;               ///< go on from that file; from the beginning while there is none
+    double checkpoint_every = 300;     ///< wall time between checkpoints [s]
+    /// Asked every few hundred steps; true ends the packing with a checkpoint.
+    std::function<bool()> interrupted = [] { return false; };
+    std::function<void(const std::string&)> message = [](const std::string&) {};
 };
 
 /// Makes a sample. The same specification and seed give the same sample for any number of threads.
@@ -37,7 +50,9 @@ struct PackReport {
 /// Walls are smooth throughout.
 /// \param report  set anew
 /// \throws UsageError  grains that do not fit
-/// \throws Error       grains lost through a wall, or pressed into each other by more than a quarter of their size
-Sample pack(const Spec& spec, std::uint64_t seed, PackReport& report);
+/// \throws Error       grains lost through a wall, or pressed into each other by more than a quarter of their size; a checkpoint that is
+///                     damaged or belongs to another packing
+/// \return an empty sample when `report.interrupted`. A packing that was stopped and resumed gives the same sample as one that was not.
+Sample pack(const Spec& spec, std::uint64_t seed, PackReport& report, const PackControl& control = {});
 
 }  // namespace coral::pack

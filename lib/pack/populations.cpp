@@ -265,7 +265,7 @@ ShapeTemplate load_shape(const Population& p, std::int64_t id, double reach)
     return shape;
 }
 
-Grains make_grains(const Spec& spec, std::uint64_t seed)
+Grains make_grains(const Spec& spec, std::uint64_t seed, const std::function<void()>& visit)
 {
     Random random(seed);
     Grains grains;
@@ -318,6 +318,7 @@ Grains make_grains(const Spec& spec, std::uint64_t seed)
         sample.shapes[k] = p.shape == ShapeKind::sphere ? unit_sphere() : load_shape(p, wanted[k].id, reach);
         const std::lock_guard lock(progress_lock);
         progress.update(double(++done));
+        visit();
     };
     const auto is_sh = [&](std::size_t k) { return spec.populations[wanted[k].population].shape == ShapeKind::sh; };
     parallel_blocks(wanted.size(), 1, [&](std::size_t k, std::size_t) {

@@ -2,6 +2,7 @@
 /// \file pack/populations.h
 /// From a specification to grains: shape templates loaded and drawn, diameters drawn, numbers found from counts and mass fractions.
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "pack/sample.h"
@@ -21,7 +22,8 @@ struct Grains {
 /// \throws UsageError  an id that the file does not have, a grain without volume, more grains than the box can hold; each with its place
 ///                     in the specification
 /// \throws Error       a damaged file
-Grains make_grains(const Spec& spec, std::uint64_t seed);
+/// \param visit  called now and then while files are read, never from two threads at once; what it throws ends the loading
+Grains make_grains(const Spec& spec, std::uint64_t seed, const std::function<void()>& visit = [] {});
 
 /// Template of a level-set grain of a .vdb file, of a harmonic shape, of a polyhedron (`id` counts those of the population) or of a
 /// superellipsoid. Lengths as in the file.

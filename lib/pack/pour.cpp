@@ -1,9 +1,9 @@
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <functional>
 #include <numbers>
 #include <random>
+#include <sstream>
 
 #include "core/error.h"
 #include "core/progress.h"
@@ -119,22 +119,56 @@ double highest_point(const dem::World& world)
 }
 
 /// Steps until the stop rule holds or the time is up. Returns whether it held.
-bool settle(dem::World& world, const Dropping& rule, double speed_limit, const std::function<void(double, double)>& tell)
+bool settle(dem::World& world, const Dropping& rule, double speed_limit, Keeper& keeper, LapClock& clock, const std::function<void(double, const MotionWindow::Means&)>& tell)
 {
     constexpr int batch_of_steps = 100, decay_every = 10;
-    const double dt = world.auto_time_step(), start = world.time();
+    const double dt = world.auto_time_step(), start = keeper.state.start;
     MotionWindow window(world);
     while (world.time() - start < rule.time_limit) {
+        clock.lap();
+        keeper.visit(world);
         window.start(world);
         for (int i = 0; i < batch_of_steps; ++i) {
             world.step(dt);
             if (i % decay_every == 0) decay_velocities(world, rule.drag, decay_every * dt);
         }
         const MotionWindow::Means means = window.means(world);
-        tell(world.time() - start, means.unbalanced_ratio);
+        tell(world.time() - start, means);
         if (means.contacts > 0 && means.unbalanced_ratio < rule.unbalanced_ratio && means.speed < speed_limit) return true;
     }
     return false;
+}
+
+/// Bodies of a batch where their particles are.
+void add_bodies(dem::World& world, const Sample& sample, const Batch& batch)
+{
+    for (const int i : batch) {
+        const Particle& p = sample.particles[std::size_t(i)];
+        dem::BodySpec body;
+        body.shape = p.shape;
+        body.material = p.material;
+        body.scale = p.scale;
+        body.role = to_string(p.role);
+        body.position = p.position;
+        body.orientation = p.orientation;
+        world.add_body(body);
+    }
+}
+
+/// The batches that the checkpoint has placed. The state of their bodies follows.
+void resume(dem::World& world, const Sample& sample, const std::vector<Batch>& batches, Random& random, Keeper& keeper)
+{
+    if (std::size_t(keeper.state.batch) >= batches.size()) keeper.damaged();
+    for (int b = 0; b <= keeper.state.batch; ++b) add_bodies(world, sample, batches[std::size_t(b)]);
+    keeper.restore(world);
+    std::istringstream(keeper.state.random) >> random;
+}
+
+std::string as_text(const Random& random)
+{
+    std::ostringstream text;
+    text << random;
+    return std::move(text).str();
 }
 
 }  // namespace
@@ -146,9 +180,10 @@ void decay_velocities(dem::World& world, double rate, double time)
     for (int i = 0; i < world.body_count(); ++i) world.set_velocity(i, factor * world.velocity(i), factor * world.angular_velocity(i));
 }
 
-void pour(Grains& grains, const Spec& spec, std::uint64_t seed, PackReport& report)
+void pour(Grains& grains, const Spec& spec, std::uint64_t seed, Keeper& keeper)
 {
-    const auto clock = std::chrono::steady_clock::now();
+    PackReport& report = keeper.state.report;
+    LapClock clock(report.pouring_seconds);
     Sample& sample = grains.sample;
     Random random(seed ^ 0x706f7572ULL);  // another stream than that of the drawing
     std::vector<std::shared_ptr<const dem::Shape>> shapes;
@@ -161,40 +196,35 @@ void pour(Grains& grains, const Spec& spec, std::uint64_t seed, PackReport& repo
     }
     const std::vector<Batch> batches = make_batches(sample, radius, spec, random);
     dem::World world = soft_world(sample, spec, shapes);
-    std::vector<int> particle_of_body;
-    Progress progress("pouring", double(batches.size()));
-    for (std::size_t b = 0; b < batches.size(); ++b) {
-        place(batches[b], sample, radius, spec, highest_point(world) + spec.dropping.drop_height, random);
-        for (const int i : batches[b]) {
-            const Particle& p = sample.particles[std::size_t(i)];
-            dem::BodySpec body;
-            body.shape = p.shape;
-            body.material = p.material;
-            body.scale = p.scale;
-            body.role = to_string(p.role);
-            body.position = p.position;
-            body.orientation = p.orientation;
-            world.add_body(body);
-            particle_of_body.push_back(i);
+    bool placed = keeper.resumes(Phase::pouring);
+    if (placed) resume(world, sample, batches, random, keeper);
+    const double limit = spec.dropping.speed_ratio * std::sqrt(spec.gravity.norm() * smallest);
+    Progress progress("pouring", double(batches.size()), keeper.state.batch);
+    for (std::size_t b = std::size_t(keeper.state.batch); b < batches.size(); ++b) {
+        if (!placed) {
+            place(batches[b], sample, radius, spec, highest_point(world) + spec.dropping.drop_height, random);
+            add_bodies(world, sample, batches[b]);
+            keeper.state.batch = int(b);
+            keeper.state.start = world.time();
+            keeper.state.random = as_text(random);
         }
-        const double limit = spec.dropping.speed_ratio * std::sqrt(spec.gravity.norm() * smallest);
-        const bool settled = settle(world, spec.dropping, limit, [&](double time, double unbalanced) {
-            progress.update(double(b) + std::min(time / spec.dropping.time_limit, 0.99),
-                            "layer " + std::to_string(b + 1) + " of " + std::to_string(batches.size()) + ", unbalanced ratio " + to_text(std::round(1e4 * unbalanced) / 1e4));
+        placed = false;
+        const bool settled = settle(world, spec.dropping, limit, keeper, clock, [&](double time, const MotionWindow::Means& means) {
+            progress.update(double(b) + std::min(time / spec.dropping.time_limit, 0.99), "layer " + std::to_string(b + 1) + " of " + std::to_string(batches.size()) + ", " + describe(means));
         });
         report.unsettled_layers += !settled;
     }
     progress.finish();
-    for (std::size_t i = 0; i < particle_of_body.size(); ++i) {
-        Particle& p = sample.particles[std::size_t(particle_of_body[i])];
-        p.position = world.position(int(i));
-        p.orientation = world.orientation(int(i));
-    }
+    int body = 0;
+    for (const Batch& batch : batches)
+        for (const int i : batch) {
+            sample.particles[std::size_t(i)].position = world.position(body);
+            sample.particles[std::size_t(i)].orientation = world.orientation(body++);
+        }
     sample.size = {spec.size.x(), spec.size.y(), highest_point(world)};
     report.layers = int(batches.size());
     report.steps += world.counters().steps;
     report.simulated_time += world.time();
-    report.pouring_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - clock).count();
 }
 
 }  // namespace coral::pack::detail

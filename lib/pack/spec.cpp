@@ -7,6 +7,7 @@
 
 #include "core/config.h"
 #include "core/error.h"
+#include "core/output_file.h"
 #include "core/text.h"
 #include "dem/polyhedron.h"
 #include "sdf/mesh_reader.h"
@@ -129,7 +130,10 @@ void read_polyhedra(const ConfigTable& table, const std::filesystem::path& folde
         const std::string extension = file.extension().string();
         if (extension != ".stl" && extension != ".ply") table.error("file", "'" + name + "' is no mesh that can be read", "take a .stl or .ply file");
         else if (!std::filesystem::exists(file)) table.error("file", "'" + file.string() + "' does not exist", "paths are relative to the folder of this file");
-        else take_corners(table, "file", {file.filename().string(), sdf::read_mesh(file, length).vertices}, p);
+        else {
+            take_corners(table, "file", {file.filename().string(), sdf::read_mesh(file, length).vertices}, p);
+            p.meshes.push_back(file);
+        }
     }
 }
 
@@ -303,6 +307,7 @@ Spec read_spec(const std::filesystem::path& file, const std::filesystem::path& g
     const Config config = Config::from_file(file);
     const ConfigTable root = config.root();
     Spec spec;
+    spec.text = read_text_file(file);
     const ConfigTable box = root.table("box");
     spec.size = box.vector("size", Dimension::length);
     spec.box_location = box.location("size");

@@ -31,6 +31,7 @@ struct Population {
     std::string location;              ///< "file:line:column" of its shape, for errors found later
     std::filesystem::path file;        ///< grains.vdb or grains.sh.h5; empty for other shapes
     std::vector<Corners> polyhedra;    ///< to draw from; only for `polyhedron`
+    std::vector<std::filesystem::path> meshes;  ///< that they come from; empty with vertices
     Eigen::Vector3d radii = Eigen::Vector3d::Zero();      ///< of a superellipsoid [m]
     Eigen::Vector2d exponents = Eigen::Vector2d::Ones();  ///< of a superellipsoid: e1, e2 of Barr
     std::vector<std::int64_t> grains;  ///< ids to draw from; empty means all
@@ -84,6 +85,7 @@ struct DensityLimits {
 };
 
 struct Spec {
+    std::string text;  ///< of the file
     Eigen::Vector3d size = Eigen::Vector3d::Zero();  ///< box the grains are dropped into; z is the height the grains should fill [m]
     std::vector<Material> materials;
     std::vector<Population> populations;

@@ -1,7 +1,13 @@
 // pack-sample as a user runs it: a small sphere packing, its summary, and what it says about bad input.
 #include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <chrono>
+#include <csignal>
+#include <cstdio>
+#include <thread>
 
 #include "core/output_file.h"
 #include "tools/run_program.h"
@@ -39,6 +45,55 @@ TEST(PackSample, draws_the_gradation_and_tells_the_relative_density)
     EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 3);  // nothing is left behind
     EXPECT_EQ(run_program("pack-sample spec.toml -o sample.h5 --psd-figure psd.gif", folder.path()).exit_code, 2);
     EXPECT_EQ(read_text_file(folder.path() / "sample.h5").find("psd.png"), std::string::npos);  // a picture does not change the sample
+}
+
+/// Packs in a process of its own and sends a signal after a while.
+int stopped_after(const std::filesystem::path& folder, int milliseconds, int signal)
+{
+    const pid_t child = fork();
+    if (child == 0) {
+        std::filesystem::current_path(folder);
+        const std::string tool = std::string(CORAL_BIN_DIR) + "/pack-sample";
+        std::freopen("log", "a", stderr);
+        execl(tool.c_str(), tool.c_str(), "spec.toml", "-o", "parts.h5", "--quiet", "--resume", "--checkpoint-every", "10ms", nullptr);
+        _exit(99);
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(milliseconds));
+    kill(child, signal);
+    int status = 0;
+    waitpid(child, &status, 0);
+    return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+}
+
+TEST(PackSample, goes_on_after_signals_to_the_same_bytes)
+{
+    const ScratchFolder folder;
+    write_text(folder.path() / "spec.toml", spec);
+    ASSERT_EQ(run_program("pack-sample spec.toml -o whole.h5 --quiet", folder.path()).exit_code, 0);
+    int parts = 0;
+    // longer and longer, since a loaded machine may take all of a short time to start
+    for (int wait = 200; !std::filesystem::exists(folder.path() / "parts.h5"); wait += 100, ++parts) {
+        ASSERT_LT(parts, 100) << read_text_file(folder.path() / "log");
+        const int signal = parts % 3 == 2 ? SIGKILL : parts % 3 == 1 ? SIGINT : SIGTERM;
+        const int code = stopped_after(folder.path(), wait, signal);
+        // a signal before the packing has begun ends the process as usual
+        EXPECT_TRUE(code == 0 || code == 128 + signal) << code;
+    }
+    EXPECT_GT(parts, 1) << "never stopped on the way";
+    EXPECT_NE(read_text_file(folder.path() / "log").find("parts.h5.checkpoint is written, give the same command with --resume to go on"), std::string::npos);
+    EXPECT_TRUE(read_text_file(folder.path() / "parts.h5") == read_text_file(folder.path() / "whole.h5"));
+    EXPECT_FALSE(std::filesystem::exists(folder.path() / "parts.h5.checkpoint"));
+}
+
+TEST(PackSample, ends_with_1_on_a_checkpoint_it_cannot_use)
+{
+    const ScratchFolder folder;
+    write_text(folder.path() / "spec.toml", spec);
+    write_text(folder.path() / "sample.h5.checkpoint", "no checkpoint");
+    const ProgramResult result = run_program("pack-sample spec.toml -o sample.h5 --resume --quiet", folder.path());
+    EXPECT_EQ(result.exit_code, 1);
+    EXPECT_NE(result.err.find("sample.h5.checkpoint: is not an HDF5 file"), std::string::npos) << result.err;
+    EXPECT_FALSE(std::filesystem::exists(folder.path() / "sample.h5"));
 }
 
 TEST(PackSample, reports_every_wrong_key_of_a_specification_and_ends_with_2)

@@ -1,9 +1,11 @@
 #pragma once
 /// \file pack/detail/phases.h
 /// The phases of a packing (pack/pack.h), one function each.
+#include <string>
 #include <vector>
 
 #include "dem/world.h"
+#include "pack/detail/keeper.h"
 #include "pack/pack.h"
 #include "pack/populations.h"
 
@@ -34,6 +36,19 @@ private:
     double time_ = 0;
 };
 
+/// "unbalanced ratio 0.012, kinetic ratio 3e-04", for the progress line.
+std::string describe(const MotionWindow::Means& means);
+
+/// How far a value has come on its way down to a limit that it nears like an exponential; for the time left.
+class Approach {
+public:
+    /// \param ratio  value over limit, the worst of several
+    double share(double ratio);
+
+private:
+    double first_ = 0;
+};
+
 /// Box of the sample as planes of a world: walls `first` .. `first + 5` in the order x-, x+, y-, y+, z-, z+.
 struct Box {
     int first = 0;
@@ -44,13 +59,13 @@ struct Box {
 };
 
 /// Pours the grains: sets pose of every particle, and the smooth walls of the sample with the top one above the highest grain.
-void pour(Grains& grains, const Spec& spec, std::uint64_t seed, PackReport& report);
+void pour(Grains& grains, const Spec& spec, std::uint64_t seed, Keeper& keeper);
 
 /// Compresses to the target in a world built from the sample (bodies in its order).
-void compress(dem::World& world, const Box& box, const Spec& spec, double apparent_volume, PackReport& report);
+void compress(dem::World& world, const Box& box, const Spec& spec, double apparent_volume, Keeper& keeper);
 
 /// Comes to rest with walls that stand still. Returns the means of the last window.
-MotionWindow::Means relax(dem::World& world, const Spec& spec, PackReport& report);
+MotionWindow::Means relax(dem::World& world, const Spec& spec, Keeper& keeper);
 
 /// Poses, walls, contacts, springs, gradation, criteria and statistics of the final state; the lower corner moves to the origin.
 void measure(const dem::World& world, const Box& box, const MotionWindow::Means& rest, double dem_step, std::int64_t steps, Sample& sample);
