@@ -54,7 +54,13 @@ struct DiscPart {
 
 Facets::Facets(const sdf::DistanceGrid& grid) : origin_(grid.origin), edge_(cells_per_block * grid.spacing)
 {
-    const sdf::TriangleMesh mesh = sdf::extract_mesh(grid);
+    sdf::TriangleMesh mesh = sdf::extract_mesh(grid);
+    // A corner of the lattice on the surface makes triangles without an area.
+    std::erase_if(mesh.triangles, [&](const Eigen::Vector3i& t) {
+        const Eigen::Vector3f a = mesh.vertices[std::size_t(t[0])].cast<float>(), b = mesh.vertices[std::size_t(t[1])].cast<float>(),
+                              c = mesh.vertices[std::size_t(t[2])].cast<float>();
+        return (b - a).cast<double>().cross((c - b).cast<double>()).norm() <= 1e-12 * grid.spacing * grid.spacing || a == c;
+    });
     blocks_ = (grid.size.array() - 2) / cells_per_block + 1;
     const auto block_of = [&](const Eigen::Vector3d& p) {
         const Eigen::Vector3i b = ((p - origin_) / edge_).array().floor().cast<int>().max(0).min(blocks_.array() - 1);
@@ -111,31 +117,34 @@ void Facets::gather(const Eigen::Vector3d& point, double distance, std::vector<s
 bool Facets::press(std::int32_t triangle, const Eigen::Vector3d& centre, double radius, Press& press) const
 {
     const Ball& ball = balls_[std::size_t(triangle)];
-    const double reach = radius + double(ball.radius);
-    const double dx = double(ball.x) - centre.x(), dy = double(ball.y) - centre.y(), dz = double(ball.z) - centre.z();
-    if (dx * dx + dy * dy + dz * dz >= reach * reach) return false;
+    const double cx = centre.x(), cy = centre.y(), cz = centre.z();
+    const double bx = double(ball.x) - cx, by = double(ball.y) - cy, bz = double(ball.z) - cz;
+    const double reach = radius + double(ball.radius), away2 = bx * bx + by * by + bz * bz;
+    if (away2 >= reach * reach) return false;
+    // In a close-fitting void most of the surface is near and little of it touches: rejected before any root is taken, in plain numbers
+    // (short vectors go through memory here, six times slower).
     const float* at = corners_[std::size_t(triangle)].at;
-    Eigen::Vector3d p[3];
-    for (int c = 0; c < 3; ++c) p[c] = Eigen::Vector3d(at[3 * c], at[3 * c + 1], at[3 * c + 2]) - centre;
-    Eigen::Vector3d normal = (p[1] - p[0]).cross(p[2] - p[0]);
-    const double twice = normal.norm();
-    if (!(twice > 0.0)) return false;
-    normal /= twice;
-    const double height = normal.dot(p[0]);
+    const double ux = double(at[3]) - at[0], uy = double(at[4]) - at[1], uz = double(at[5]) - at[2];
+    const double vx = double(at[6]) - at[0], vy = double(at[7]) - at[1], vz = double(at[8]) - at[2];
+    const double nx = uy * vz - uz * vy, ny = uz * vx - ux * vz, nz = ux * vy - uy * vx;
+    const double px = at[0] - cx, py = at[1] - cy, pz = at[2] - cz;
+    const double twice2 = nx * nx + ny * ny + nz * nz, lift = nx * px + ny * py + nz * pz;
+    if (lift * lift >= radius * radius * twice2) return false;
+    const double scale = 1.0 / std::sqrt(twice2), height = lift * scale;
     DiscPart part{radius * radius - height * height};
-    if (part.a2 <= 0.0) return false;
+    const double disc = std::sqrt(part.a2) + double(ball.radius);
+    if (away2 - height * height >= disc * disc) return false;
+    const Eigen::Vector3d normal(scale * nx, scale * ny, scale * nz), u(ux, uy, uz), v(vx, vy, vz), p(px, py, pz);
+    const Eigen::Vector3d corner[3] = {p, p + u, p + v}, side[3] = {u, v - u, -v};
     for (int c = 0; c < 3; ++c) {
-        const Eigen::Vector3d way = p[(c + 1) % 3] - p[c];
-        const double length = way.norm();
-        if (!(length > 0.0)) return false;
-        const Eigen::Vector3d along = way / length, outward = along.cross(normal);
-        const double t1 = along.dot(p[c]);
-        part.edge(outward.dot(p[c]), t1, t1 + length, outward);
+        const double length = side[c].norm();
+        const Eigen::Vector3d along = side[c] / length, outward = along.cross(normal);
+        const double t1 = along.dot(corner[c]);
+        part.edge(outward.dot(corner[c]), t1, t1 + length, outward);
     }
-    if (!(part.area > 0.0)) return false;
     press.force = (height * part.area * normal + part.first) / -radius;
     press.energy = 0.5 * (part.a2 * part.area - part.polar) / radius;
-    return press.energy > 0.0;
+    return part.area > 0.0 && press.energy > 0.0;
 }
 
 }  // namespace coral::dem::detail
