@@ -67,6 +67,17 @@ struct Places {
         force[best] += press.force;
         energy[best] += press.energy;
     }
+    /// A deep press that was taken for several places, seen as one. \returns whether `from` became part of `to`
+    bool merge(int to, int from)
+    {
+        const double product = force[to].norm() * force[from].norm();
+        if (!(product > 0.0) || force[to].dot(force[from]) < same_wall * product) return false;
+        force[to] += force[from];
+        energy[to] += energy[from];
+        force[from].setZero();
+        if (slot[to] < 0) std::swap(slot[to], slot[from]);
+        return true;
+    }
 };
 
 }  // namespace
@@ -96,6 +107,8 @@ bool World::Impl::press_on_walls(std::size_t k, double dt, GeneralForce& out, Lo
         now.energy += stiffness * scale[j] * press.energy;
     }
     s.elastic_normal += now.energy;
+    for (int to = 0; to < places.count; ++to)
+        for (int from = to + 1; from < places.count; ++from) places.merge(to, from);
 
     const Vec3 way = dt * (v[i] - v[j]);
     const std::uint8_t before = l.touch[k];

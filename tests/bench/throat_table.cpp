@@ -3,41 +3,12 @@
 #include <random>
 
 #include "bench/table.h"
-#include "dem/shapes_for_tests.h"
+#include "dem/cavities_for_tests.h"
 
 namespace {
 
 using namespace coral::dem;
 using namespace coral::dem::testing;
-
-/// A block with a cavity, as a fixed body. Distances of the cavity are those of its walls alone.
-std::shared_ptr<const Shape> carved(const Distance& cavity, double half, double spacing)
-{
-    GridShapeData d;
-    d.name = "block";
-    d.distance = tabulate(cavity, Vec3::Constant(half), spacing);
-    d.nodes = {Vec3(half, 0, 0), Vec3(0, half, 0), Vec3(0, 0, half)};  // no node contact here
-    d.node_areas = {1e-6, 1e-6, 1e-6};
-    d.volume = 1e-6;
-    d.inertia = 1e-12 * Eigen::Matrix3d::Identity();
-    return Shape::grid(std::move(d));
-}
-
-World scene(const std::shared_ptr<const Shape>& shape, SphereScheme scheme, const Vec3& gravity = Vec3::Zero(), double damping = 0, double friction = 0)
-{
-    WorldOptions o;
-    o.gravity = gravity;
-    o.sphere_scheme = scheme;
-    o.skin = 0.25e-3;  // as in a sample of 2 mm grains
-    World world(o);
-    world.add_material({"default", 2780.0, 2e5, 1e5, friction, damping});
-    BodySpec body;
-    body.shape = world.add_shape(shape);
-    body.motion = Motion::fixed;
-    world.add_body(body);
-    world.add_shape(Shape::sphere());
-    return world;
-}
 
 /// Largest radius of a sphere at a point that touches nothing [m].
 double room(World& world, const Vec3& at, double most)
@@ -81,7 +52,7 @@ void throats()
                     const Vec3 d = place < 4 ? Vec3::UnitZ() : Vec3(u(random), u(random), u(random)).normalized();
                     const Vec3 e = d.cross(place < 2 ? Vec3::UnitX() : Vec3(u(random), u(random), u(random))).normalized();
                     const auto shape = carved([&](const Vec3& p) { return rho - (p - shift).cross(d).norm(); }, 1.6 * rho + 0.6e-3, h);
-                    World world = scene(shape, scheme);
+                    World world = cavity_world(shape, scheme);
                     axis.add(1e6 * (room(world, shift, rho) - rho));
                     near.add(1e6 * (room(world, shift + 0.25 * h * e, rho) - (rho - 0.25 * h)));
                     middle.add(1e6 * (room(world, shift + 0.5 * rho * e, 0.5 * rho) - 0.5 * rho));
@@ -91,17 +62,6 @@ void throats()
                 std::printf("\n");
                 std::fflush(stdout);
             }
-}
-
-/// Cavity between two half spaces that meet in the line x = z = 0 at 60 degrees, moved and turned about x and z by small angles.
-Distance groove(const Vec3& shift, const Quat& turn)
-{
-    const double half = std::numbers::pi / 6;
-    const Vec3 left(std::cos(half), 0, std::sin(half)), right(-std::cos(half), 0, std::sin(half));
-    return [=](const Vec3& p) {
-        const Vec3 q = turn.conjugate() * (p - shift);
-        return std::min(left.dot(q), right.dot(q));
-    };
 }
 
 void grooves()
@@ -115,7 +75,7 @@ void grooves()
                 // The lattice of tabulate() has nodes at -half - 0.37 h + k h; half = 4 mm is a multiple of all three spacings.
                 const Vec3 shift = axis == 0 ? Vec3(-0.37 * h, 0, -1.5e-3) : Vec3(0.08 * h, 0, -1.5e-3);
                 const Quat turn = axis == 2 ? Quat(Eigen::AngleAxisd(0.2, Vec3(1, 0.4, 2).normalized())) : Quat::Identity();
-                World world = scene(carved(groove(shift, turn), 4e-3, h), scheme, turn * Vec3(0, 0, -g), 0.3, 0.0);
+                World world = cavity_world(carved(groove(shift, turn), 4e-3, h), scheme, turn * Vec3(0, 0, -g), 0.3, 0.0);
                 const Vec3 up = turn * Vec3::UnitZ();
                 const int b = add_sphere(world, 1, 2 * r, shift + (2 * r + 100e-6) * up);
                 world.advance(10e-3);
@@ -143,24 +103,12 @@ struct Cavity {
     double speed = 0.1;
 };
 
-double to_segment(const Vec3& p, const Vec3& a, const Vec3& b)
-{
-    const Vec3 ab = b - a;
-    return (p - a - std::clamp(ab.dot(p - a) / ab.squaredNorm(), 0.0, 1.0) * ab).norm();
-}
-
 std::vector<Cavity> cavities()
 {
-    const auto lobes = [](const Vec3& p) {
-        const Vec3 a(0.2e-3, -0.1e-3, 0.15e-3);
-        double d = -1;
-        for (const Vec3& end : {Vec3(2e-3, 0.4e-3, 0.3e-3), Vec3(-0.9e-3, 1.8e-3, 0.2e-3), Vec3(-0.7e-3, -0.9e-3, -1.6e-3)}) d = std::max(d, 1.15e-3 - to_segment(p, a, end));
-        return d;
-    };
     return {{"round void, 2 R", [](const Vec3& p) { return 2e-3 - p.norm(); }, 2.6e-3, 1e-3},
             {"round void, 1.05 R", [](const Vec3& p) { return 1.05e-3 - p.norm(); }, 1.8e-3, 1e-3},
             {"bore, 1.05 R", [](const Vec3& p) { return 1.05e-3 - to_segment(p, Vec3(-1e-3, 0.5e-3, 0.2e-3), Vec3(1.2e-3, -0.3e-3, 0.1e-3)); }, 3e-3, 1e-3, Vec3(0.1e-3, 0.1e-3, 0.15e-3)},
-            {"three bores, 1.15 R", lobes, 3.8e-3, 1e-3, Vec3(0.2e-3, -0.1e-3, 0.15e-3)},
+            {"three bores, 1.15 R", three_bores, 3.8e-3, 1e-3, Vec3(0.2e-3, -0.1e-3, 0.15e-3)},
             {"cube, 3 R", [](const Vec3& p) { return 1.5e-3 - p.cwiseAbs().maxCoeff(); }, 2.2e-3, 1e-3},
             {"groove of 60 degrees", groove(Vec3(0, 0, -1.5e-3), Quat::Identity()), 4e-3, 1e-3, Vec3(0.1e-3, 0, 1e-3), Vec3(0, 0, -9.81), 0.02}};
 }
@@ -179,7 +127,7 @@ void bounces()
                 double mean = 0, worst = 0, time = 0;
                 int steps = 0, escaped = 0;
                 for (int start = 0; start < starts; ++start) {
-                    World world = scene(shape, scheme, c.gravity);
+                    World world = cavity_world(shape, scheme, c.gravity);
                     const Vec3 to(normal(random), normal(random), normal(random));
                     const Vec3 at = c.start;
                     Vec3 v = c.speed * to.normalized();
