@@ -24,6 +24,7 @@ World make_world(const Scene& scene, double skin)
     for (const std::vector<double>& row : scene.bodies) {
         body.position = {row.at(0), row.at(1), row.at(2)};
         body.scale = 2 * row.at(3);
+        if (row.size() > 6) body.velocity = {row[4], row[5], row[6]};
         world.add_body(body);
     }
     return world;
