@@ -15,7 +15,7 @@ namespace {
 constexpr int steps_between_checks = 50;  ///< walls keep their velocity in between
 constexpr int checks_per_window = 10;     ///< of the means that the stop rules look at
 constexpr double lid_first = 0.05;        ///< side walls wait until the lid carries this share of the pressure
-constexpr double deepest_overlap = 0.25;  ///< of the smaller radius; beyond it grains have lost their shape
+constexpr double deepest_overlap = 0.5;   ///< of the smaller radius; from here on forces are capped (dem::WorldOptions::overlap_cap)
 
 void step_some(dem::World& world, double dt, double drag)
 {
@@ -25,12 +25,27 @@ void step_some(dem::World& world, double dt, double drag)
     }
 }
 
+[[noreturn]] void throw_deepest(const dem::World& world)
+{
+    const auto smaller = [&](const dem::Contact& c) {
+        return std::min(world.equivalent_radius(c.first), c.second < 0 ? 1e300 : world.equivalent_radius(c.second));
+    };
+    const std::vector<dem::Contact> contacts = world.contacts();
+    const dem::Contact& worst = *std::max_element(contacts.begin(), contacts.end(), [&](const dem::Contact& s, const dem::Contact& t) {
+        return s.overlap / smaller(s) < t.overlap / smaller(t);
+    });
+    const auto name = [&](int body) {
+        if (body < 0) return "wall " + std::to_string(-1 - body);
+        return world.role(body) + " grain " + std::to_string(body) + " (diameter " + to_text(2e3 * world.equivalent_radius(body)) + " mm)";
+    };
+    throw Error("compression", name(worst.first) + " and " + name(worst.second) + " are pressed into each other by " +
+                    std::to_string(int(100 * worst.overlap / smaller(worst))) + " % of the smaller radius, with a force of " + to_text(worst.normal_force.norm()) + " N",
+                "lower the pressure, raise the void ratio, or raise normal_stiffness");
+}
+
 void check_sound(const dem::World& world, const Box& box)
 {
-    const double overlap = world.statistics().max_overlap;
-    if (overlap > deepest_overlap)
-        throw Error("compression", "grains are pressed into each other by " + std::to_string(int(100 * overlap)) + " % of their radius",
-                    "lower the pressure, raise the void ratio, or raise normal_stiffness");
+    if (world.statistics().max_overlap > deepest_overlap) throw_deepest(world);
     const Eigen::Vector3d lower = box.lower(world), upper = box.upper(world);
     for (int i = 0; i < world.body_count(); ++i)
         if ((world.position(i).array() < lower.array()).any() || (world.position(i).array() > upper.array()).any())
