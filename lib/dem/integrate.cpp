@@ -231,8 +231,10 @@ void World::Impl::correct_crossings()
                 (c.pair >= 0 ? nodes.owed[std::size_t(c.pair)] : sphere_grids.press[std::size_t(c.press)].owed) = c.energy;
                 continue;
             }
+            const double square = speed * speed + 2.0 * c.energy * inverse;
+            if (speed == 0.0 || square < 0.0) lost_energy += square < 0.0 ? c.energy + 0.5 * speed * speed / inverse : c.energy;
             if (speed == 0.0) continue;
-            const double corrected = std::copysign(std::sqrt(std::max(speed * speed + 2.0 * c.energy * inverse, 0.0)), speed);
+            const double corrected = std::copysign(std::sqrt(std::max(square, 0.0)), speed);
             const Vec3 impulse = (corrected - speed) / inverse * c.normal;
             kick_at(a, c.arm_a, impulse);
             if (c.b >= 0) kick_at(std::size_t(c.b), c.arm_b, -impulse);

@@ -29,8 +29,10 @@ void make_sphere_list(World::Impl& world, const std::vector<BroadPair>& pairs)
         if (l.other.size() == begin) continue;
         l.rows.push_back(a);
         l.row.push_back(Index(l.other.size()));
-        l.spring.resize(l.other.size(), Vec3::Zero());
+        l.memory.resize(l.other.size());
         l.touch.resize(l.other.size(), 0);
+        for (std::size_t m = begin; m < l.other.size(); ++m)
+            l.root_mass.push_back(std::sqrt(1.0 / (world.inverse_mass[std::size_t(a)] + world.inverse_mass[std::size_t(l.other[m])])));
         while (old_row < old.rows.size() && old.rows[old_row] < a) ++old_row;
         if (old_row == old.rows.size() || old.rows[old_row] != a) continue;
         Index k = old.row[old_row];
@@ -38,11 +40,11 @@ void make_sphere_list(World::Impl& world, const std::vector<BroadPair>& pairs)
             while (k < old.row[old_row + 1] && old.other[std::size_t(k)] < l.other[m]) ++k;
             if (k == old.row[old_row + 1]) break;
             if (old.other[std::size_t(k)] != l.other[m]) continue;
-            l.spring[m] = old.spring[std::size_t(k)];
+            l.memory[m] = old.memory[std::size_t(k)];
             l.touch[m] = old.touch[std::size_t(k)];
         }
     }
-    l.out.resize(l.other.size());
+    l.make_room();
 }
 
 void make_sphere_wall_list(World::Impl& world, double skin)
@@ -70,12 +72,12 @@ void make_sphere_wall_list(World::Impl& world, double skin)
                 };
                 while (k < old.body.size() && before(k)) ++k;
                 const bool same = k < old.body.size() && old.body[k] == Index(i) && old.wall[k] == Index(wall) && old.feature[k] == feature;
-                l.spring.push_back(same ? old.spring[k] : Vec3::Zero());
+                l.memory.push_back(same ? old.memory[k] : PointMemory{});
                 l.touch.push_back(same ? old.touch[k] : std::uint8_t{0});
             }
         }
     }
-    l.out.resize(l.body.size());
+    l.make_room();
 }
 
 void make_sphere_grid_list(World::Impl& world, const std::vector<BroadPair>& pairs, double skin)

@@ -116,10 +116,10 @@ std::vector<ContactSpring> World::contact_springs() const
     for (std::size_t r = 0; r < m.spheres.rows.size(); ++r)
         for (Index k = m.spheres.row[r]; k < m.spheres.row[r + 1]; ++k)
             if (m.spheres.touch[std::size_t(k)])
-                list.push_back({m.spheres.rows[r], m.spheres.other[std::size_t(k)], 0, m.spheres.spring[std::size_t(k)], Vec3::Zero()});
+                list.push_back({m.spheres.rows[r], m.spheres.other[std::size_t(k)], 0, m.spheres.memory[std::size_t(k)].spring, Vec3::Zero()});
     const SphereWallList& w = m.sphere_walls;
     for (std::size_t k = 0; k < w.body.size(); ++k)
-        if (w.touch[k]) list.push_back({w.body[k], -1 - w.wall[k], w.feature[k], w.spring[k], Vec3::Zero()});
+        if (w.touch[k]) list.push_back({w.body[k], -1 - w.wall[k], w.feature[k], w.memory[k].spring, Vec3::Zero()});
     const SphereGridList& g = m.sphere_grids;
     for (std::size_t k = 0; k < g.sphere.size(); ++k)
         for (int slot = 0; slot < Slots::count; ++slot)
@@ -147,14 +147,14 @@ void World::set_contact_springs(std::span<const ContactSpring> springs)
             const auto found = std::lower_bound(begin, end, s.second);
             if (found != end && *found == s.second) {
                 const std::size_t k = std::size_t(found - m.spheres.other.begin());
-                m.spheres.spring[k] = s.spring;
+                m.spheres.memory[k].spring = s.spring;
                 m.spheres.touch[k] = 1;
                 continue;
             }
         }
         for (std::size_t k = 0; s.second < 0 && k < m.sphere_walls.body.size(); ++k)
             if (m.sphere_walls.body[k] == s.first && m.sphere_walls.wall[k] == -1 - s.second && m.sphere_walls.feature[k] == s.node) {
-                m.sphere_walls.spring[k] = s.spring;
+                m.sphere_walls.memory[k].spring = s.spring;
                 m.sphere_walls.touch[k] = 1;
             }
         for (std::size_t k = 0; s.second >= 0 && k < m.sphere_grids.sphere.size(); ++k)
@@ -183,12 +183,12 @@ void World::Impl::drop_contacts(Index body)
     for (std::size_t r = 0; r < spheres.rows.size(); ++r)
         for (Index k = spheres.row[r]; k < spheres.row[r + 1]; ++k)
             if (spheres.rows[r] == body || spheres.other[std::size_t(k)] == body) {
-                spheres.spring[std::size_t(k)].setZero();
+                spheres.memory[std::size_t(k)] = {};
                 spheres.touch[std::size_t(k)] = 0;
             }
     for (std::size_t k = 0; k < sphere_walls.body.size(); ++k)
         if (sphere_walls.body[k] == body) {
-            sphere_walls.spring[k].setZero();
+            sphere_walls.memory[k] = {};
             sphere_walls.touch[k] = 0;
         }
     for (std::size_t k = 0; k < sphere_grids.sphere.size(); ++k)

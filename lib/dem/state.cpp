@@ -73,9 +73,9 @@ void visit_state(World::Impl& m, Archive& io)
     for (WallData& wall : m.walls) io(wall.point), io(wall.velocity), io(wall.force), io(wall.reference);
     io(m.options.gravity), io(m.any_external), io(m.active), io(m.lists_valid), io(m.forces_valid), io(m.skin), io(m.x_reference), io(m.q_reference);
     SphereList& s = m.spheres;
-    io(s.row), io(s.other), io(s.spring), io(s.touch), io(s.out), io(s.rows);
+    io(s.row), io(s.other), io(s.memory), io(s.touch), io(s.root_mass), io(s.out), io(s.rows);
     SphereWallList& w = m.sphere_walls;
-    io(w.body), io(w.wall), io(w.feature), io(w.touch), io(w.spring), io(w.out);
+    io(w.body), io(w.wall), io(w.feature), io(w.touch), io(w.memory), io(w.out);
     SphereGridList& g = m.sphere_grids;
     io(g.sphere), io(g.grid), io(g.touch), io(g.slots), io(g.press), io(g.facet_start), io(g.facet), io(g.out);
     NodeList& n = m.nodes;
@@ -118,6 +118,8 @@ void World::restore(std::span<const std::uint8_t> state)
     if (m.sphere_grids.press.size() == m.sphere_grids.grid.size())
         for (const Index grid : m.sphere_grids.grid)
             if (m.shapes[std::size_t(m.shape[std::size_t(grid)])]->kind() == ShapeKind::grid) m.facets_of(m.shape[std::size_t(grid)]);
+    m.spheres.make_room();
+    m.sphere_walls.make_room();
 }
 
 }  // namespace coral::dem

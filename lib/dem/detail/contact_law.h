@@ -7,6 +7,8 @@
 #include <cmath>
 #include <cstdint>
 
+#include "dem/detail/lanes.h"
+
 namespace coral::dem::detail {
 
 using Vec3 = Eigen::Vector3d;
@@ -121,6 +123,15 @@ struct Periodic {
     {
         if (any)
             for (int k = 0; k < 3; ++k) r[k] -= length[k] * std::nearbyint(r[k] * inverse[k]);
+        return r;
+    }
+    Vec3Lanes operator()(Vec3Lanes r) const
+    {
+        if (any) {
+            r.x -= length.x() * nearbyint(r.x * inverse.x());
+            r.y -= length.y() * nearbyint(r.y * inverse.y());
+            r.z -= length.z() * nearbyint(r.z * inverse.z());
+        }
         return r;
     }
 };

@@ -30,10 +30,18 @@ struct WallData {
 
 /// One-point contact of a sphere with a sphere or a wall, as the loops leave it for summation and reports.
 struct PointForce {
-    Index a = 0, b = 0;                                       ///< b < 0: wall -1 - b
+    Index a = 0, b = 0;                                     ///< b < 0: wall -1 - b
     Vec3 normal = Vec3::Zero(), tangential = Vec3::Zero();  ///< unit, from b to a; force on a
     double force = 0, overlap = 0;                          ///< normal force; depth
     double arm_a = 0, arm_b = 0;                            ///< distance of the contact point from the centres along the normal
+};
+
+/// What a one-point contact keeps from one step to the next.
+struct PointMemory {
+    Vec3 spring = Vec3::Zero();
+    Vec3 normal = Vec3::Zero();  ///< at the end of the last step
+    Vec3 drag = Vec3::Zero();    ///< force on a that is not elastic, at the end of the last step: its work is dissipated
+    double overlap = 0;
 };
 
 /// Any other contact (sphere on grid, nodes): forces and torques of both sides. points == 0: nothing touches.
@@ -58,17 +66,37 @@ struct Crossing {
 /// Half list of sphere pairs in compressed rows: partners of sphere i are other[row[i]..row[i+1]), ascending.
 struct SphereList {
     std::vector<Index> row, other;
-    std::vector<Vec3> spring;
+    std::vector<PointMemory> memory;
     std::vector<std::uint8_t> touch;  ///< 0 apart, 1 touching, 2 touching without force (clamped)
+    std::vector<double> root_mass;    ///< sqrt(m*)
     std::vector<PointForce> out;
     std::vector<Index> rows;  ///< spheres with partners
+    std::vector<Index> near;  ///< for the loop: entries that touch, block by block
+    std::vector<Index> near_row;
+    /// Of what the loop writes, for the entries that are there.
+    void make_room()
+    {
+        out.resize(other.size());
+        near.resize(other.size());
+        near_row.resize(other.size());
+    }
 };
 
 struct SphereWallList {
     std::vector<Index> body, wall;
     std::vector<std::uint8_t> feature, touch;
-    std::vector<Vec3> spring;
+    std::vector<PointMemory> memory;
     std::vector<PointForce> out;
+    std::vector<Index> near;        ///< as above
+    std::vector<Vec3> near_normal;
+    std::vector<double> near_overlap;
+    void make_room()
+    {
+        out.resize(body.size());
+        near.resize(body.size());
+        near_normal.resize(body.size());
+        near_overlap.resize(body.size());
+    }
 };
 
 /// Friction springs of a pair, keyed by the normal in the frame of the grid: a sphere that rests on two walls of a groove
@@ -161,6 +189,7 @@ struct World::Impl {
     LoopSums sums;
     double time = 0;
     double dissipated_friction = 0, dissipated_damping = 0, gravity_work = 0, external_work = 0, wall_work = 0, initial = 0;
+    double lost_energy = 0;
     bool ledger_started = false;
     Counters counters;
 

@@ -1,0 +1,55 @@
+#pragma once
+/// \file dem/detail/lanes.h
+/// Four numbers, or four vectors, side by side: contacts are worked four at a time. Every lane does what scalar code would, in the same
+/// order, so a contact's result does not depend on its neighbours in a group.
+#include <Eigen/Core>
+#include <cmath>
+
+namespace coral::dem::detail {
+
+// GCC warns that passing these by value depends on the instruction set; all uses are inline.
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wpsabi"
+
+typedef double Lanes __attribute__((vector_size(32)));
+
+constexpr int lane_count = 4;
+
+[[gnu::always_inline]] inline Lanes all(double value) { return Lanes{value, value, value, value}; }
+[[gnu::always_inline]] inline Lanes sqrt(Lanes a)
+{
+    Lanes root;
+    for (int k = 0; k < lane_count; ++k) root[k] = std::sqrt(a[k]);
+    return root;
+}
+[[gnu::always_inline]] inline Lanes nearbyint(Lanes a)
+{
+    Lanes whole;
+    for (int k = 0; k < lane_count; ++k) whole[k] = std::nearbyint(a[k]);
+    return whole;
+}
+[[gnu::always_inline]] inline Lanes min(Lanes a, Lanes b) { return a < b ? a : b; }
+[[gnu::always_inline]] inline Lanes max(Lanes a, Lanes b) { return a > b ? a : b; }
+
+struct Vec3Lanes {
+    Lanes x, y, z;
+};
+[[gnu::always_inline]] inline Vec3Lanes operator+(const Vec3Lanes& a, const Vec3Lanes& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
+[[gnu::always_inline]] inline Vec3Lanes operator-(const Vec3Lanes& a, const Vec3Lanes& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+[[gnu::always_inline]] inline Vec3Lanes operator*(Lanes s, const Vec3Lanes& a) { return {s * a.x, s * a.y, s * a.z}; }
+[[gnu::always_inline]] inline Lanes dot(const Vec3Lanes& a, const Vec3Lanes& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+[[gnu::always_inline]] inline Vec3Lanes cross(const Vec3Lanes& a, const Vec3Lanes& b)
+{
+    return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+
+/// Vectors at four places, one a lane.
+[[gnu::always_inline]] inline Vec3Lanes gather(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c, const Eigen::Vector3d& d)
+{
+    return {Lanes{a.x(), b.x(), c.x(), d.x()}, Lanes{a.y(), b.y(), c.y(), d.y()}, Lanes{a.z(), b.z(), c.z(), d.z()}};
+}
+[[gnu::always_inline]] inline Eigen::Vector3d lane(const Vec3Lanes& v, int k) { return {v.x[k], v.y[k], v.z[k]}; }
+
+#pragma GCC diagnostic pop
+
+}  // namespace coral::dem::detail
