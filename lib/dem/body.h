@@ -71,8 +71,10 @@ struct Energy {
     double gravity_work = 0;   ///< on free bodies, since then
     double external_work = 0;  ///< of set_external_force
     double wall_work = 0;      ///< of moving walls and prescribed bodies, and of bodies added or removed
-    double friction = 0, damping = 0;  ///< dissipated
-    double closure = 0;        ///< error of the balance
+    double friction = 0, damping = 0;  ///< dissipated: work of friction that no spring keeps; of dashpots, and where they hold contacts back
+    /// Error of the balance. Left out of it is what the scheme holds in the middle of contacts and pays back by their end: the part of
+    /// velocity Verlet that is second order in the step, and errors of work on their way back to the motion.
+    double closure = 0;
     double stored() const { return kinetic + elastic_normal + elastic_tangential; }
 };
 

@@ -1,5 +1,6 @@
 // Contact of surface nodes with a distance field (grid or wall), and the ordered sums of all contact loops.
 #include <cmath>
+#include <span>
 
 #include "core/parallel.h"
 #include "dem/detail/impl.h"
@@ -35,12 +36,12 @@ struct Field {
     }
 };
 
-/// What the trapezoid of the forces at both ends of a step takes from a pair's motion beside what its nodes store: of the order of the
-/// step only where nodes open, close or change to another face, else of the third. Gathered over the nodes; see correct_crossings().
+/// What the forces at both ends of a step took from a pair's motion beside what its nodes store: of the order of the step only where nodes
+/// open, close or change to another face, else of the third. Gathered over the nodes; see correct_crossings().
 struct WorkError {
     double energy = 0.0, stored = 0.0, weight = 0.0;
     Vec3 push = Vec3::Zero(), arm = Vec3::Zero();
-    bool clamped = false;  ///< a dashpot held a node back: what it lost is booked as damping
+    bool clamped = false;  ///< a dashpot held a node back: the error is its doing
 
     void add(double node_energy, double node_stored, const Vec3& node_push, const Vec3& node_arm)
     {
@@ -53,17 +54,220 @@ struct WorkError {
     }
 
     /// Passes it on for correction, once it is more than the noise of depths.
-    void hand_over(double& owed, Index pair, const GeneralForce& contact, const Vec3& to_b, std::vector<Crossing>& list) const
+    void hand_over(double& owed, Index pair, const GeneralForce& contact, const Vec3& to_b, std::vector<Crossing>& list, LoopSums& s) const
     {
         const double give = owed + energy, size = push.norm();
         owed = 0.0;
-        if (clamped || !(size > 0.0)) return;
+        if (clamped || !(size > 0.0)) {
+            s.damping += give;
+            return;
+        }
         if (std::abs(give) < 1e-6 * stored) {
             if (contact.points > 0) owed = give;
+            else s.damping += give;
             return;
         }
         const Vec3 at = arm / weight;
         list.push_back({contact.a, contact.b, give, push / size, to_b + at, at, contact.points > 0 ? pair : -1});
+    }
+};
+
+/// One pair of the node list as it stands in this step. Three passes over its touching nodes: elastic forces, dashpots, friction.
+class NodePair {
+public:
+    NodePair(const World::Impl& world, std::size_t p, double dt) : world_(world), list_(world.nodes), p_(p), dt_(dt)
+    {
+        const std::size_t a = a_ = std::size_t(list_.slave[p]);
+        const Index master = list_.master[p];
+        double master_inverse_mass = 0.0, reach_b = world.equivalent[a], inverse_radius = 1.0 / world.equivalent[a];
+        Index material_b;
+        if (master >= 0) {
+            const std::size_t b = std::size_t(master);
+            to_b_ = world.periodic(world.x[a] - world.x[b]);
+            field_.body = detail::DistanceField(*world.shapes[std::size_t(world.shape[b])]);
+            field_.rotation = world.q[b].toRotationMatrix();
+            field_.centre = world.x[a] - to_b_;
+            field_.scale = world.scale[b];
+            master_inverse_mass = world.inverse_mass[b];
+            inverse_radius += 1.0 / world.equivalent[b];
+            velocity_b_ = world.v[b];
+            end_b_ = world.v_end[b];
+            spin_b_ = world.w[b];
+            old_spin_b_ = world.w_before[b];
+            material_b = world.material[b];
+            reach_b = world.equivalent[b];
+        } else {
+            const WallData& wall = world.walls[std::size_t(-1 - master)];
+            field_.wall = &wall;
+            velocity_b_ = end_b_ = wall.velocity;
+            material_b = wall.material;
+        }
+        smaller_ = std::min(world.equivalent[a], reach_b);
+        law_ = &world.law(world.material[a], material_b);
+        root_mass_ = std::sqrt(1.0 / (world.inverse_mass[a] + master_inverse_mass));
+        share_ = list_.share[p];
+        stiffness_ = share_ * law_->kn * inverse_radius / (2.0 * EIGEN_PI) * world.scale[a] * world.scale[a];
+        inverse_length_ = sigmoid / (2.0 * smaller_);
+    }
+
+    /// Elastic forces of all nodes within reach; `old` are the contacts of the last step, `now` gets those of this one.
+    void press(std::span<const NodeContact> old, double near, std::vector<NodeContact>& now, LoopSums& s)
+    {
+        const Shape& surface = *world_.shapes[std::size_t(world_.shape[a_])];
+        const Eigen::Matrix3d rotation = world_.scale[a_] * world_.q[a_].toRotationMatrix();
+        auto past = old.begin();
+        for (Index k = list_.start[p_]; k < list_.start[p_ + 1]; ++k) {
+            const Index node = list_.node[std::size_t(k)];
+            for (; past != old.end() && past->node < node; ++past) release(*past, 0.0, Vec3::Zero(), s);
+            const bool held = past != old.end() && past->node == node;
+            if (!held && double(list_.clearance[std::size_t(k)]) > near) continue;
+            ++s.node_queries;
+            NodeContact c;
+            c.node = node;
+            c.arm = rotation * surface.nodes()[std::size_t(node)];
+            c.depth = -field_(world_.x[a_] + c.arm, c.gradient);
+            c.stiffness = stiffness_ * surface.node_areas()[std::size_t(node)];
+            if (c.depth <= 0.0) {
+                if (held) release(*past, 0.0, Vec3::Zero(), s), ++past;
+                continue;
+            }
+            const detail::NodePotential potential = detail::node_potential(c.depth, inverse_length_);
+            c.force = c.stiffness * potential.force;
+            const double stored = c.stiffness * potential.energy;
+            s.elastic_normal += stored;
+            total_ += c.force;
+            const Vec3 push = c.force * c.gradient;
+            if (held) {
+                release(*past, stored, push, s, &c);
+                c.touch = past->touch;
+                c.spring = past->spring;
+                c.pull = past->pull;
+                old_.push_back(*past++);
+            } else {
+                if (dt_ > 0.0) error_.add(-stored - 0.5 * dt_ * push.dot(velocity_now(c.arm)), stored, push, c.arm);
+                old_.push_back({});
+            }
+            now.push_back(c);
+        }
+        for (; past != old.end(); ++past) release(*past, 0.0, Vec3::Zero(), s);
+    }
+
+    void damp(std::span<NodeContact> contacts, LoopSums& s)
+    {
+        const double inverse_total = total_ > 0.0 ? 1.0 / total_ : 0.0;
+        for (NodeContact& c : contacts) {
+            const double weight = c.force * inverse_total, slope = c.gradient.norm();
+            const Vec3 n = slope < 1e-9 ? Vec3::UnitZ() : Vec3(c.gradient / slope);
+            const double elastic = c.force * slope;
+            c.force = elastic;
+            c.touch = 1;
+            if (law_->damping > 0.0 && weight > 0.0) {
+                const Vec3 relative = world_.v_end[a_] + world_.w[a_].cross(c.arm) - end_b_ - spin_b_.cross(to_b_ + c.arm);
+                c.force = weight * share_ * detail::normal_force(elastic / (weight * share_), -relative.dot(n), *law_, root_mass_);
+                if (c.force == 0.0) {
+                    c.touch = 2;
+                    error_.clamped = true;
+                }
+            }
+            c.drag = (c.force - elastic) * n;
+            s.damping -= 0.5 * dt_ * c.drag.dot(velocity_now(c.arm));
+            normal_total_ += c.force;
+        }
+    }
+
+    /// Friction, and the sums of the pair. Springs share the force by the nodes' parts of the normal force.
+    void rub(std::span<NodeContact> contacts, GeneralForce& out, LoopSums& s)
+    {
+        const double per_normal = normal_total_ > 0.0 ? 1.0 / normal_total_ : 0.0;
+        for (std::size_t k = 0; k < contacts.size(); ++k) {
+            NodeContact& c = contacts[k];
+            const NodeContact& past = old_[k];
+            const double slope = c.gradient.norm();
+            const Vec3 n = slope < 1e-9 ? Vec3::UnitZ() : Vec3(c.gradient / slope);
+            const Vec3 velocity = velocity_now(c.arm), slide = velocity - n.dot(velocity) * n;
+            const double weight = share_ * c.force * per_normal;
+            Vec3 old_slide = Vec3::Zero();
+            double held = 0.0, taken = 0.0;
+            if (past.touch) {
+                const Vec3 old_velocity = velocity_before(past.arm);
+                const double old_slope = past.gradient.norm();
+                const Vec3 old_n = old_slope < 1e-9 ? Vec3::UnitZ() : Vec3(past.gradient / old_slope);
+                old_slide = old_velocity - old_n.dot(old_velocity) * old_n;
+                held = -0.5 * past.pull.dot(past.spring);
+                taken = -0.5 * dt_ * past.pull.dot(old_velocity);
+            }
+            const detail::Friction friction = detail::rub({*law_, n, slide, old_slide, 0.5 * (world_.w[a_] + spin_b_).dot(n), root_mass_}, normal_total_ / share_,
+                                                          dt_, c.spring);
+            c.pull = weight * friction.pull;
+            const Vec3 tangential = weight * friction.total, brake = tangential - c.pull;
+            c.drag += brake;
+            const double stored = -0.5 * c.pull.dot(c.spring);
+            s.elastic_tangential += stored;
+            // Nodes that come and go take springs along: what they hold and nobody gets back is lost as by slip.
+            s.friction += taken - 0.5 * dt_ * c.pull.dot(velocity) - (stored - held);
+            s.damping -= 0.5 * dt_ * brake.dot(velocity);
+            const Vec3 normal = c.force * n;
+            out.normal_force += normal;
+            out.tangential_force += tangential;
+            out.torque_a += c.arm.cross(normal + tangential);
+            out.torque_b -= (to_b_ + c.arm).cross(normal + tangential);
+            out.arm += c.force * per_normal * c.arm;
+            out.overlap = std::max(out.overlap, c.depth);
+            ++out.points;
+        }
+    }
+
+    void finish(const GeneralForce& out, double& owed, std::vector<Crossing>& crossing, LoopSums& s) const
+    {
+        error_.hand_over(owed, Index(p_), out, to_b_, crossing, s);
+        if (out.points == 0) return;
+        ++s.touching;
+        s.max_overlap = std::max(s.max_overlap, out.overlap / smaller_);
+    }
+
+private:
+    /// Of a point of the slave against the master, in the middle of the step, as the geometry is at its end ...
+    Vec3 velocity_now(const Vec3& arm) const { return world_.v[a_] - velocity_b_ + world_.w[a_].cross(arm) - spin_b_.cross(to_b_ + arm); }
+    /// ... and at its start.
+    Vec3 velocity_before(const Vec3& arm) const
+    {
+        const Vec3 drift = world_.v[a_] - velocity_b_;
+        return drift + world_.w_before[a_].cross(arm) - old_spin_b_.cross(to_b_ - dt_ * drift + arm);
+    }
+
+    /// The half step that the forces of a contact of the last step still act for; `stored` and `push` are what became of it.
+    void release(const NodeContact& past, double stored, const Vec3& push, LoopSums& s, const NodeContact* now = nullptr)
+    {
+        const Vec3 velocity = velocity_before(past.arm);
+        const detail::NodePotential potential = detail::node_potential(past.depth, inverse_length_);
+        const Vec3 old_push = (past.stiffness * potential.force) * past.gradient;
+        const double released = past.stiffness * potential.energy;
+        s.damping -= 0.5 * dt_ * past.drag.dot(velocity);
+        double work = old_push.dot(velocity);
+        if (now) work += push.dot(velocity_now(now->arm));
+        else s.friction -= 0.5 * dt_ * past.pull.dot(velocity) + 0.5 * past.pull.dot(past.spring);
+        if (dt_ <= 0.0) return;
+        const double energy = released - stored - 0.5 * dt_ * work;
+        if (past.touch == 2) s.damping += energy;
+        else error_.add(energy, stored + released, push + old_push, past.arm);
+    }
+
+    const World::Impl& world_;
+    const NodeList& list_;
+    std::size_t p_, a_;
+    double dt_;
+    Field field_;
+    const PairLaw* law_;
+    Vec3 velocity_b_ = Vec3::Zero(), end_b_ = Vec3::Zero(), spin_b_ = Vec3::Zero(), old_spin_b_ = Vec3::Zero(), to_b_ = Vec3::Zero();
+    double root_mass_, share_, stiffness_, inverse_length_, smaller_, total_ = 0.0, normal_total_ = 0.0;
+    WorkError error_;
+    std::vector<NodeContact>& old_ = scratch();
+
+    static std::vector<NodeContact>& scratch()
+    {
+        static thread_local std::vector<NodeContact> contacts;
+        contacts.clear();
+        return contacts;
     }
 };
 
@@ -72,144 +276,38 @@ struct WorkError {
 void World::Impl::node_loop(double dt)
 {
     NodeList& l = nodes;
-    const std::size_t base = (spheres.rows.size() + row_grain - 1) / row_grain +
-                             (sphere_walls.body.size() + entry_grain - 1) / entry_grain + (sphere_grids.sphere.size() + grid_grain - 1) / grid_grain;
-    // What was farther away when the list was made than both sides have come since is not looked at; the quarter more is for lattices,
-    // whose values may rise a little faster than the way (free_path leaves the same room).
-    const double near = 2.5 * node_drift;
+    const std::size_t base = out_count[0].size() + out_count[1].size() + out_count[2].size();
     parallel_blocks(l.slave.size(), node_grain, [&](std::size_t first, std::size_t last) {
+        const std::size_t block = first / node_grain;
         LoopSums s;
-        std::vector<Crossing>& crossing = crossings[base + first / node_grain];
+        std::vector<Crossing>& crossing = crossings[base + block];
+        std::vector<NodeContact>&contacts = l.contacts[block], &fresh = l.fresh[block];
+        fresh.clear();
+        GeneralForce* const begin = l.out.data() + first;
+        GeneralForce* out = begin;
         for (std::size_t p = first; p < last; ++p) {
-            const std::size_t a = std::size_t(l.slave[p]);
-            const Index master = l.master[p];
-            GeneralForce& out = l.out[p];
-            out = {};
-            out.a = l.slave[p];
-            out.b = master;
-            Field field;
-            const Shape& surface = *shapes[std::size_t(shape[a])];
-            double master_inverse_mass = 0.0, reach_b = 0.0, inverse_radius = 1.0 / equivalent[a];
-            Vec3 velocity_b = Vec3::Zero(), end_b = Vec3::Zero(), spin_b = Vec3::Zero(), to_b = Vec3::Zero();
-            Index material_b;
-            if (master >= 0) {
-                const std::size_t b = std::size_t(master);
-                to_b = periodic(x[a] - x[b]);
-                field.body = detail::DistanceField(*shapes[std::size_t(shape[b])]);
-                field.rotation = q[b].toRotationMatrix();
-                field.centre = x[a] - to_b;
-                field.scale = scale[b];
-                master_inverse_mass = inverse_mass[b];
-                inverse_radius += 1.0 / equivalent[b];
-                velocity_b = v[b];
-                end_b = v_end[b];
-                spin_b = w[b];
-                material_b = material[b];
-                reach_b = equivalent[b];
-            } else {
-                const WallData& wall = walls[std::size_t(-1 - master)];
-                field.wall = &wall;
-                velocity_b = end_b = wall.velocity;
-                material_b = wall.material;
-                reach_b = equivalent[a];
-            }
-            const PairLaw& pair = law(material[a], material_b);
-            const double root_mass = std::sqrt(1.0 / (inverse_mass[a] + master_inverse_mass));
-            const double share = l.share[p];
-            const double stiffness = share * pair.kn * inverse_radius / (2.0 * EIGEN_PI) * scale[a] * scale[a];
-            const double inverse_length = sigmoid / (2.0 * std::min(equivalent[a], reach_b));
-            const Eigen::Matrix3d rotation = scale[a] * q[a].toRotationMatrix();
-            double total = 0.0;
-            WorkError error;
-            for (Index k = l.start[p]; k < l.start[p + 1]; ++k) {
-                if (l.clearance[k] > near && l.touch[k] == 0) continue;
-                ++s.node_queries;
-                const Vec3 arm = rotation * surface.nodes()[std::size_t(l.node[k])];
-                l.arm[k] = arm;
-                const Vec3 old_gradient = l.gradient[k];
-                const double old_depth = l.depth[k];
-                const double depth = -field(x[a] + arm, l.gradient[k]);
-                l.depth[k] = depth;
-                l.force[k] = 0.0;
-                if (depth <= 0.0 && l.touch[k] == 0) continue;
-                const double area_stiffness = stiffness * surface.node_areas()[std::size_t(l.node[k])];
-                double stored = 0.0;
-                Vec3 push = Vec3::Zero();
-                if (depth > 0.0) {
-                    const detail::NodePotential potential = detail::node_potential(depth, inverse_length);
-                    l.force[k] = area_stiffness * potential.force;
-                    s.elastic_normal += area_stiffness * potential.energy;
-                    total += l.force[k];
-                    stored = area_stiffness * potential.energy;
-                    push = l.force[k] * l.gradient[k];
-                }
-                if (dt <= 0.0 || l.touch[k] == 2) continue;
-                double released = 0.0;
-                if (l.touch[k] == 1) {
-                    const detail::NodePotential past = detail::node_potential(old_depth, inverse_length);
-                    released = area_stiffness * past.energy;
-                    push += (area_stiffness * past.force) * old_gradient;
-                }
-                const Vec3 turned = dt * w[a].cross(arm), drift = dt * (v[a] - velocity_b);
-                const Vec3 way = drift + dt * w[a].cross(arm - 0.5 * turned) - dt * spin_b.cross(to_b + arm - 0.5 * (drift + turned));
-                error.add(released - stored - 0.5 * push.dot(way), stored + released, push, arm);
-            }
             s.tests += l.start[p + 1] - l.start[p];
-            const double inverse_total = total > 0.0 ? 1.0 / total : 0.0;
-            // Friction bound of every spring: the whole normal force of the pair, known after a first pass.
-            double normal_total = 0.0;
-            for (Index k = l.start[p]; k < l.start[p + 1]; ++k) {
-                if (l.depth[k] <= 0.0) {
-                    if (l.touch[k]) {
-                        l.touch[k] = 0;
-                        l.spring[k].setZero();
-                    }
-                    continue;
-                }
-                const double weight = l.force[k] * inverse_total, slope = l.gradient[k].norm();
-                const Vec3 n = slope < 1e-9 ? Vec3::UnitZ() : Vec3(l.gradient[k] / slope);
-                const Vec3& arm = l.arm[k];
-                const Vec3 relative = v_end[a] + w[a].cross(arm) - end_b - spin_b.cross(to_b + arm);
-                double fn = l.force[k] * slope;
-                if (!l.touch[k]) l.spring[k].setZero();
-                l.touch[k] = 1;
-                if (pair.damping > 0.0 && weight > 0.0) {
-                    LoopSums node_sums;
-                    fn = weight * share * normal_force(fn / (weight * share), -relative.dot(n), pair, root_mass, dt, node_sums);
-                    s.damping += weight * share * node_sums.damping;
-                    if (fn == 0.0) {
-                        l.touch[k] = 2;
-                        error.clamped = true;
-                    }
-                }
-                l.force[k] = fn;
-                normal_total += fn;
+            // What was farther away when it was listed than both sides have come since is not looked at.
+            const double near = 1.25 * (l.drift_of(l.slave[p]) + l.drift_of(l.master[p]));
+            const Index from = Index(fresh.size());
+            if (l.count[p] > 0 || double(l.least[p]) <= near) {
+                NodePair pair(*this, p, dt);
+                *out = {};
+                out->a = l.slave[p];
+                out->b = l.master[p];
+                pair.press({contacts.data() + l.first[p], std::size_t(l.count[p])}, near, fresh, s);
+                const std::span<NodeContact> now(fresh.data() + from, fresh.size() - std::size_t(from));
+                pair.damp(now, s);
+                pair.rub(now, *out, s);
+                pair.finish(*out, l.owed[p], crossing, s);
+                if (out->points > 0) ++out;
             }
-            for (Index k = l.start[p]; k < l.start[p + 1]; ++k) {
-                if (l.depth[k] <= 0.0) continue;
-                const double slope = l.gradient[k].norm();
-                const Vec3 n = slope < 1e-9 ? Vec3::UnitZ() : Vec3(l.gradient[k] / slope);
-                const Vec3& arm = l.arm[k];
-                const Vec3 relative = v[a] + w[a].cross(arm) - velocity_b - spin_b.cross(to_b + arm);
-                const Vec3 slide = relative - n.dot(relative) * n;
-                const double weight = normal_total > 0.0 ? l.force[k] / normal_total : 0.0;
-                const Vec3 ft = tangential_force(pair, normal_total / share, n, slide, 0.5 * (w[a] + spin_b).dot(n), root_mass, dt,
-                                                 weight * share, l.spring[k], s);
-                const Vec3 fn = l.force[k] * n;
-                out.normal_force += fn;
-                out.tangential_force += ft;
-                out.torque_a += arm.cross(fn + ft);
-                out.torque_b -= (to_b + arm).cross(fn + ft);
-                out.arm += weight * arm;
-                out.overlap = std::max(out.overlap, l.depth[k]);
-                ++out.points;
-            }
-            error.hand_over(l.owed[p], Index(p), out, to_b, crossing);
-            if (out.points == 0) continue;
-            ++s.touching;
-            s.max_overlap = std::max(s.max_overlap, out.overlap / std::min(equivalent[a], reach_b));
+            l.first[p] = from;
+            l.count[p] = Index(fresh.size()) - from;
         }
-        block_sums[base + first / node_grain] = s;
+        contacts.swap(fresh);
+        out_count[3][block] = std::int32_t(out - begin);
+        block_sums[base + block] = s;
     });
 }
 
@@ -250,8 +348,8 @@ void World::Impl::sum_forces()
         for (std::int32_t k = 0; k < out_count[1][block]; ++k) add_point(sphere_walls.out[block * entry_grain + std::size_t(k)]);
     for (std::size_t block = 0; block < out_count[2].size(); ++block)
         for (std::int32_t k = 0; k < out_count[2][block]; ++k) add_general(sphere_grids.out[block * grid_grain + std::size_t(k)]);
-    for (const GeneralForce& c : nodes.out)
-        if (c.points > 0) add_general(c);
+    for (std::size_t block = 0; block < out_count[3].size(); ++block)
+        for (std::int32_t k = 0; k < out_count[3][block]; ++k) add_general(nodes.out[block * node_grain + std::size_t(k)]);
 }
 
 void World::Impl::compute_contacts(double dt)
@@ -279,7 +377,9 @@ void World::Impl::refresh_forces()
     if (forces_valid) return;
     const double before = sums.elastic_normal + sums.elastic_tangential;
     const double friction = dissipated_friction;
-    node_drift = free_path * skin;  // whoever moved the bodies: every listed node is looked at
+    // Whoever moved the bodies: every listed node is looked at.
+    std::fill(nodes.drift.begin(), nodes.drift.end(), free_path * nodes.skin);
+    w_before = w;
     v_end = v;
     compute_contacts(0.0);
     // What bodies put in, taken out or moved by the caller changed in the contacts is the caller's work.

@@ -4,7 +4,6 @@
 #include <numbers>
 
 #include "core/parallel.h"
-#include "dem/detail/crossing.h"
 #include "dem/detail/impl.h"
 
 namespace coral::dem {
@@ -98,28 +97,23 @@ bool World::Impl::press_on_walls(std::size_t k, double dt, GeneralForce& out, Lo
     const double stiffness = pair.kn * scale[j] * scale[j] / (2.0 * std::numbers::pi * radius[i]);
     Slots& slots = l.slots[k];
     Places places(slots);
-    WallPress now;
+    PressMemory now;
+    Vec3 push = Vec3::Zero();
     detail::Press press;
     for (Index f = l.facet_start[k]; f < l.facet_start[k + 1]; ++f) {
         if (!surface.press(l.facet[std::size_t(f)], local, radius[i] / scale[j], press)) continue;
         places.add(press);
-        now.push += stiffness * press.force;
-        now.energy += stiffness * scale[j] * press.energy;
+        push += stiffness * press.force;
+        now.stored += stiffness * scale[j] * press.energy;
     }
-    s.elastic_normal += now.energy;
     for (int to = 0; to < places.count; ++to)
         for (int from = to + 1; from < places.count; ++from) places.merge(to, from);
-
-    const Vec3 way = dt * (v[i] - v[j]);
-    const std::uint8_t before = l.touch[k];
-    const WallPress past = before ? l.press[k] : WallPress{};
-    const Vec3 drift = q[j].conjugate() * Vec3(way - dt * w[j].cross(offset - 0.5 * way));
+    now.push.add(q[j] * push, Vec3::Zero(), offset);
 
     const double root_mass = std::sqrt(1.0 / (inverse_mass[i] + inverse_mass[j]));
     const double spin_limit = 1e-12 * radius[i] * radius[i];
     Slots kept;
     kept.next = slots.next;
-    std::uint8_t carried = 0;
     bool clamped = false;
     double total = 0.0;
     out = {};
@@ -129,17 +123,21 @@ bool World::Impl::press_on_walls(std::size_t k, double dt, GeneralForce& out, Lo
         const Vec3 local_normal = places.force[p] / size, n = q[j] * local_normal;
         const double overlap = 2.0 * scale[j] * places.energy[p] / size;  // of a plane
         const double approach = (v_end[j] + w[j].cross(offset) - v_end[i]).dot(n);
-        const double fn = normal_force(stiffness * size, approach, pair, root_mass, dt, s);
+        const double fn = normal_force(stiffness * size, approach, pair, root_mass);
         clamped = clamped || fn == 0.0;
         const double arm_i = radius[i] - 0.5 * overlap;
         const Vec3 arm_j = offset - arm_i * n;
         const Vec3 velocity = v[i] - v[j] - arm_i * w[i].cross(n) - w[j].cross(arm_j);
         const Vec3 slide = velocity - n.dot(velocity) * n;
         const int at = places.slot[p] >= 0 ? places.slot[p] : std::countr_one(unsigned(kept.used | slots.used));
-        if (places.slot[p] >= 0) kept.spring[at] = slots.spring[at], carried = std::uint8_t(carried | 1 << at);
+        if (places.slot[p] >= 0) kept.spring[at] = slots.spring[at];
         kept.used = std::uint8_t(kept.used | 1 << at);
         kept.normal[at] = local_normal;
-        const Vec3 ft = tangential_force(pair, fn, n, slide, 0.5 * (w[i] + w[j]).dot(n), root_mass, dt, 1.0, kept.spring[at], s);
+        const detail::Friction friction = detail::rub({pair, n, slide, slide, 0.5 * (w[i] + w[j]).dot(n), root_mass}, fn, dt, kept.spring[at]);
+        const Vec3& ft = friction.total;
+        now.pull.add(friction.pull, -arm_i * n, arm_j);
+        now.drag.add((fn - stiffness * size) * n + (ft - friction.pull), -arm_i * n, arm_j);
+        now.stretched += 0.5 * pair.kt * kept.spring[at].squaredNorm();
         out.normal_force += fn * n;
         out.tangential_force += ft;
         out.torque_a -= arm_i * n.cross(ft);
@@ -149,37 +147,109 @@ bool World::Impl::press_on_walls(std::size_t k, double dt, GeneralForce& out, Lo
         out.overlap = std::max(out.overlap, overlap);
         ++out.points;
     }
-    for (int slot = 0; slot < Slots::count; ++slot)
-        if ((slots.used & ~carried) >> slot & 1) s.friction += 0.5 * pair.kt * slots.spring[slot].squaredNorm();
     slots = kept;
-    l.touch[k] = out.points == 0 ? 0 : clamped ? 2 : 1;
-    l.press[k] = now;
-
-    // Work of the trapezoid of both ends against the change of what is stored: they differ where walls open and close (see WorkError).
-    const Vec3 sum = now.push + past.push;
-    const double strength = sum.norm(), error = past.energy - now.energy - 0.5 * sum.dot(drift) + past.owed;
-    if (dt > 0.0 && before != 2 && !clamped && strength > 0.0) {
-        if (std::abs(error) > 1e-6 * (past.energy + now.energy)) {
-            crossing.push_back({Index(i), Index(j), error, q[j] * Vec3(sum / strength), offset});
-            if (out.points > 0) crossing.back().press = Index(k);
-        } else {
-            l.press[k].owed = error;
-        }
-    }
-    if (out.points == 0) return false;
     out.a = Index(i);
     out.b = Index(j);
+    close_books(k, now, clamped, dt, out, s, crossing);
+    if (out.points == 0) return false;
     if (total > 0.0) out.arm /= total;
     s.max_overlap = std::max(s.max_overlap, out.overlap / radius[i]);
     s.deep += out.overlap > options.overlap_cap * radius[i];
     return true;
 }
 
+/// The same with its nearest wall alone.
+bool World::Impl::press_on_nearest(std::size_t k, double dt, GeneralForce& out, LoopSums& s, std::vector<Crossing>& crossing)
+{
+    SphereGridList& l = sphere_grids;
+    const std::size_t i = std::size_t(l.sphere[k]), j = std::size_t(l.grid[k]);
+    const detail::DistanceField field(*shapes[std::size_t(shape[j])]);
+    const Vec3 offset = periodic(x[i] - x[j]);
+    Vec3 local_gradient;
+    const double overlap = radius[i] - scale[j] * field.distance_and_gradient(q[j].conjugate() * offset / scale[j], local_gradient);
+    const bool touching = overlap > 0.0;
+    if (!touching && l.touch[k] == 0) return false;
+    const PairLaw& pair = law(material[i], material[j]);
+    const double slope = local_gradient.norm();
+    const Vec3 local_normal = slope > 1e-9 ? Vec3(local_gradient / slope) : Vec3::UnitZ();
+    const Vec3 n = q[j] * local_normal;
+    const double root_mass = std::sqrt(1.0 / (inverse_mass[i] + inverse_mass[j]));
+    PressMemory now;
+    Slots& slots = l.slots[k];
+    out = {};
+    out.a = Index(i);
+    out.b = Index(j);
+    bool clamped = false;
+    if (touching) {
+        const double cap = options.overlap_cap * radius[i], pressed = std::min(overlap, cap), elastic = pair.kn * pressed * slope;
+        const double approach = (v_end[j] + w[j].cross(offset) - v_end[i]).dot(n), fn = normal_force(elastic, approach, pair, root_mass);
+        clamped = fn == 0.0;
+        const double arm_i = radius[i] - 0.5 * overlap;
+        const Vec3 arm_j = offset - arm_i * n;  // contact point, from the grid's centre
+        const Vec3 velocity = v[i] - v[j] - arm_i * w[i].cross(n) - w[j].cross(arm_j);
+        const Vec3 slide = velocity - n.dot(velocity) * n;
+        Vec3& spring = slots.spring[slot_of(slots, local_normal)];
+        const detail::Friction friction = detail::rub({pair, n, slide, slide, 0.5 * (w[i] + w[j]).dot(n), root_mass}, fn, dt, spring);
+        out.points = 1;
+        out.overlap = overlap;
+        out.normal_force = fn * n;
+        out.tangential_force = friction.total;
+        out.torque_a = -arm_i * n.cross(friction.total);
+        out.torque_b = -arm_j.cross(out.normal_force + friction.total);
+        out.arm = -arm_i * n;
+        now.push.add(elastic * n, Vec3::Zero(), offset);
+        now.pull.add(friction.pull, out.arm, arm_j);
+        now.drag.add((fn - elastic) * n + (friction.total - friction.pull), out.arm, arm_j);
+        now.stored = pair.kn * pressed * (overlap - 0.5 * pressed);
+        now.stretched = 0.5 * pair.kt * spring.squaredNorm();
+        s.max_overlap = std::max(s.max_overlap, overlap / radius[i]);
+        s.deep += overlap > cap;
+    } else {
+        slots.used = 0;
+    }
+    close_books(k, now, clamped, dt, out, s, crossing);
+    return touching;
+}
+
+/// The energies of pair k after a step: what dashpots and friction took, and what the forces at both ends of the step did beside the change
+/// of what is stored, which goes back to the motion (see WorkError). Springs of slots that are left or opened count as slip.
+void World::Impl::close_books(std::size_t k, const PressMemory& now, bool clamped, double dt, GeneralForce& out, LoopSums& s,
+                              std::vector<Crossing>& crossing)
+{
+    SphereGridList& l = sphere_grids;
+    const std::size_t i = std::size_t(out.a), j = std::size_t(out.b);
+    const std::uint8_t before = l.touch[k];
+    const PressMemory past = before ? l.press[k] : PressMemory{};
+    const Vec3 velocity = v[i] - v[j];
+    const auto work = [&](const Wrench& first, const Wrench& second) {
+        return 0.5 * dt * (first.power(velocity, w[i], w_before[j]) + second.power(velocity, w[i], w[j]));
+    };
+    s.elastic_normal += now.stored;
+    s.elastic_tangential += now.stretched;
+    s.damping -= work(past.drag, now.drag);
+    s.friction -= work(past.pull, now.pull) + now.stretched - past.stretched;
+    l.touch[k] = out.points == 0 ? 0 : clamped ? 2 : 1;
+    l.press[k] = now;
+    if (dt <= 0.0) return;
+    const Vec3 sum = now.push.force + past.push.force;
+    const double strength = sum.norm(), error = past.stored - now.stored - work(past.push, now.push) + past.owed;
+    if (before == 2 || clamped || !(strength > 0.0)) {
+        s.damping += error;
+    } else if (std::abs(error) > 1e-6 * (past.stored + now.stored)) {
+        crossing.push_back({out.a, out.b, error, sum / strength, periodic(x[i] - x[j])});
+        if (out.points > 0) crossing.back().press = Index(k);
+    } else if (out.points > 0) {
+        l.press[k].owed = error;
+    } else {
+        s.damping += error;
+    }
+}
+
 void World::Impl::sphere_grid_loop(double dt)
 {
     SphereGridList& l = sphere_grids;
     const bool all_walls = options.sphere_scheme == SphereScheme::walls;
-    const std::size_t base = (spheres.rows.size() + row_grain - 1) / row_grain + (sphere_walls.body.size() + entry_grain - 1) / entry_grain;
+    const std::size_t base = out_count[0].size() + out_count[1].size();
     parallel_blocks(l.sphere.size(), grid_grain, [&](std::size_t first, std::size_t last) {
         const std::size_t block = first / grid_grain;
         LoopSums s;
@@ -187,61 +257,8 @@ void World::Impl::sphere_grid_loop(double dt)
         GeneralForce* const begin = l.out.data() + first;
         GeneralForce* out = begin;
         for (std::size_t k = first; k < last; ++k) {
-            const std::size_t i = std::size_t(l.sphere[k]), j = std::size_t(l.grid[k]);
-            const detail::DistanceField field(*shapes[std::size_t(shape[j])]);
-            if (all_walls && field.grid) {
-                if (press_on_walls(k, dt, *out, s, crossing)) ++out;
-                continue;
-            }
-            const Vec3 offset = periodic(x[i] - x[j]);
-            Vec3 local_gradient;
-            const Vec3 local = q[j].conjugate() * offset;
-            const double overlap = radius[i] - scale[j] * field.distance_and_gradient(local / scale[j], local_gradient);
-            const bool touching = overlap > 0.0;
-            if (!touching && l.touch[k] == 0) continue;
-            const PairLaw& pair = law(material[i], material[j]);
-            const double slope = local_gradient.norm();
-            const Vec3 local_normal = slope > 1e-9 ? Vec3(local_gradient / slope) : Vec3::UnitZ();
-            const Vec3 n = q[j] * local_normal;
-            const Vec3 arm_j = offset - n * (radius[i] - 0.5 * overlap);  // contact point, from the grid's centre
-            const Vec3 relative = v[i] - v[j] - w[j].cross(offset);
-            const double root_mass = std::sqrt(1.0 / (inverse_mass[i] + inverse_mass[j]));
-            const double approach = (v_end[j] + w[j].cross(offset) - v_end[i]).dot(n);
-            if (touching != (l.touch[k] != 0) && dt > 0.0 && l.touch[k] != 2) {
-                // Where the centre was against the grid a step ago: the rigid motion of the pair taken back.
-                const Vec3 before = q[j].conjugate() * Vec3(offset - relative * dt);
-                const double past = radius[i] - scale[j] * field.distance(before / scale[j]);
-                detail::add_crossing(crossing, Index(i), Index(j), pair, past, overlap, approach, root_mass, dt, n, offset, s);
-            }
-            if (!touching) {
-                for (int slot = 0; slot < Slots::count; ++slot)
-                    if (l.slots[k].used >> slot & 1) s.friction += 0.5 * pair.kt * l.slots[k].spring[slot].squaredNorm();
-                l.slots[k].used = 0;
-                l.touch[k] = 0;
-                continue;
-            }
-            const double cap = options.overlap_cap * radius[i], pressed = std::min(overlap, cap);
-            const double fn = normal_force(pair.kn * pressed * slope, approach, pair, root_mass, dt, s);
-            const double arm_i = radius[i] - 0.5 * overlap;
-            const Vec3 velocity = v[i] - v[j] - arm_i * w[i].cross(n) - w[j].cross(arm_j);
-            const Vec3 slide = velocity - n.dot(velocity) * n;
-            Slots& slots = l.slots[k];
-            const int slot = slot_of(slots, local_normal);
-            const Vec3 ft = tangential_force(pair, fn, n, slide, 0.5 * (w[i] + w[j]).dot(n), root_mass, dt, 1.0, slots.spring[slot], s);
-            out->a = Index(i);
-            out->b = Index(j);
-            out->points = 1;
-            out->overlap = overlap;
-            out->normal_force = fn * n;
-            out->tangential_force = ft;
-            out->torque_a = -arm_i * n.cross(ft);
-            out->torque_b = -arm_j.cross(out->normal_force + ft);
-            out->arm = -arm_i * n;
-            ++out;
-            l.touch[k] = fn > 0.0 ? 1 : 2;
-            s.elastic_normal += pair.kn * pressed * (overlap - 0.5 * pressed);
-            s.max_overlap = std::max(s.max_overlap, overlap / radius[i]);
-            s.deep += overlap > cap;
+            const bool on_grid = shapes[std::size_t(shape[std::size_t(l.grid[k])])]->kind() == ShapeKind::grid;
+            if (all_walls && on_grid ? press_on_walls(k, dt, *out, s, crossing) : press_on_nearest(k, dt, *out, s, crossing)) ++out;
         }
         s.tests = std::int64_t(last - first);
         s.touching = out - begin;

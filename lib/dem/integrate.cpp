@@ -121,12 +121,12 @@ void World::Impl::kick_with_added_mass(std::size_t i, double dt)
     external_work -= 0.5 * added_mass[i].dot(v[i].cwiseAbs2() - before.cwiseAbs2());
 }
 
-// First kick, way and turn of every body in one pass over memory; returns whether the neighbour lists are worn out.
-bool World::Impl::kick_and_drift(double dt)
+// First kick, way and turn of every body in one pass over memory; returns which lists are worn out.
+World::Impl::Worn World::Impl::kick_and_drift(double dt)
 {
     const Vec3 half_g = 0.5 * dt * options.gravity;
     const double limit = free_path * skin, limit2 = limit * limit;
-    node_drift = 0.0;
+    double farthest = 0.0;
     double finite = 0.0, gravity_way = 0.0, external = 0.0;
     bool expired = false;
     for (std::size_t i = 0; i < x.size(); ++i) {
@@ -152,19 +152,23 @@ bool World::Impl::kick_and_drift(double dt)
             turn_sphere(q[i], dt * w[i]);
             continue;
         }
+        w_before[i] = w[i];
         turn_grid(i, dt);
-        // |q - q'| is half the angle for small turns; either sign of q is the same turn.
-        const double turn = 2.0 * std::min((q[i].coeffs() - q_reference[i].coeffs()).norm(), (q[i].coeffs() + q_reference[i].coeffs()).norm());
-        node_drift = std::max(node_drift, std::sqrt(moved2) + turn * radius[i]);
+        if (mixed) expired = expired || std::sqrt(moved2) + turn_between(q[i], q_reference[i]) * radius[i] > limit;
+        nodes.drift[i] = drift_since_listed(i);
+        farthest = std::max(farthest, nodes.drift[i]);
     }
     gravity_work += gravity_way;
     external_work += external;
-    for (WallData& wall : walls) {
+    for (std::size_t k = 0; k < walls.size(); ++k) {
+        WallData& wall = walls[k];
         wall.point += dt * wall.velocity;
-        node_drift = std::max(node_drift, (wall.point - wall.reference).norm());
+        expired = expired || (wall.point - wall.reference).squaredNorm() > limit2;
+        nodes.wall_drift[k] = (wall.point - nodes.wall_listed[k]).norm();
+        farthest = std::max(farthest, nodes.wall_drift[k]);
     }
     if (!std::isfinite(finite)) check_numbers();
-    return expired || node_drift > limit;
+    return {expired, farthest > free_path * nodes.skin};
 }
 
 void World::Impl::turn_grid(std::size_t i, double dt)
@@ -232,7 +236,6 @@ void World::Impl::correct_crossings()
                 continue;
             }
             const double square = speed * speed + 2.0 * c.energy * inverse;
-            if (speed == 0.0 || square < 0.0) lost_energy += square < 0.0 ? c.energy + 0.5 * speed * speed / inverse : c.energy;
             if (speed == 0.0) continue;
             const double corrected = std::copysign(std::sqrt(std::max(square, 0.0)), speed);
             const Vec3 impulse = (corrected - speed) / inverse * c.normal;
@@ -250,20 +253,24 @@ void World::Impl::step(double dt)
     refresh_forces();
     if (!ledger_started) {
         initial = kinetic_energy() + sums.elastic_normal + sums.elastic_tangential;
+        last_dt = dt;
+        initial_account = on_account();
         dissipated_friction = dissipated_damping = gravity_work = external_work = wall_work = 0.0;
         ledger_started = true;
     }
     auto start = std::chrono::steady_clock::now();
     constraint_work(dt);
-    const bool expired = kick_and_drift(dt);
+    const Worn worn = kick_and_drift(dt);
     counters.seconds_integration += seconds_since(start);
-    if (expired) make_lists();
+    if (worn.lists) make_lists();
+    else if (worn.nodes) list_nodes(nullptr);
     compute_contacts(dt);
     start = std::chrono::steady_clock::now();
     kick(0.5 * dt);
     correct_crossings();
     constraint_work(dt);
     time += dt;
+    last_dt = dt;
     ++counters.steps;
     counters.seconds_integration += seconds_since(start);
 }

@@ -10,8 +10,6 @@ namespace coral::dem {
 
 namespace {
 
-std::uint64_t key_of(Index a, Index b) { return std::uint64_t(std::uint32_t(a)) << 32 | std::uint32_t(b); }
-
 void make_sphere_list(World::Impl& world, const std::vector<BroadPair>& pairs)
 {
     SphereList old = std::move(world.spheres);
@@ -115,121 +113,12 @@ void make_sphere_grid_list(World::Impl& world, const std::vector<BroadPair>& pai
         const bool same = k < old.sphere.size() && key_of(old.sphere[k], old.grid[k]) == key;
         l.touch.push_back(same ? old.touch[k] : std::uint8_t{0});
         l.slots.push_back(same ? old.slots[k] : Slots{});
+        l.press.push_back(same ? old.press[k] : PressMemory{});
         if (!all_walls) continue;
-        l.press.push_back(same ? old.press[k] : WallPress{});
         if (shape.kind() == ShapeKind::grid) world.facets_of(world.shape[j]).gather(local / scale, within / scale, l.facet);
         l.facet_start.push_back(Index(l.facet.size()));
     }
     l.out.resize(l.sphere.size());
-}
-
-/// Nodes of `slave` within the skin of `master`, tested cluster by cluster.
-template <class Distance>
-void append_nodes(const World::Impl& world, Index slave, double skin, const Distance& distance, NodeList& l)
-{
-    const std::size_t a = std::size_t(slave);
-    const Shape& shape = *world.shapes[std::size_t(world.shape[a])];
-    const double scale = world.scale[a];
-    const Eigen::Matrix3d rotation = scale * world.q[a].toRotationMatrix();
-    const auto near = [&](const Shape::Cluster& c) { return distance(rotation * c.centre) <= 1.05 * scale * c.radius + skin; };
-    for (const Shape::Cluster& group : shape.groups()) {
-        if (!near(group)) continue;
-        for (int c = group.begin; c < group.end; ++c) {
-            const Shape::Cluster& cluster = shape.clusters()[std::size_t(c)];
-            if (!near(cluster)) continue;
-            for (int n = cluster.begin; n < cluster.end; ++n)
-                if (const double d = distance(rotation * shape.nodes()[std::size_t(n)]); d < skin) {
-                    l.node.push_back(n);
-                    l.clearance.push_back(d);
-                }
-        }
-    }
-}
-
-void append_pair(const World::Impl& world, const NodeList& old, NodeList& l, Index slave, Index master, double skin, double share)
-{
-    const std::size_t a = std::size_t(slave);
-    const std::size_t begin = l.node.size();
-    if (master >= 0) {
-        const std::size_t b = std::size_t(master);
-        const Vec3 to_b = world.periodic(world.x[a] - world.x[b]);
-        const double scale = world.scale[b];
-        const Eigen::Matrix3d to_local = world.q[b].toRotationMatrix().transpose() / scale;
-        const detail::DistanceField field(*world.shapes[std::size_t(world.shape[b])]);
-        append_nodes(world, slave, skin, [&](const Vec3& arm) { return scale * field.lower_bound(to_local * (to_b + arm)); }, l);
-    } else {
-        const WallData& wall = world.walls[std::size_t(-1 - master)];
-        if (wall.kind == WallData::Kind::plane) {
-            const double height = wall.normal.dot(world.x[a] - wall.point);
-            if (height > world.radius[a] + skin) return;
-            append_nodes(world, slave, skin, [&](const Vec3& arm) { return height + wall.normal.dot(arm); }, l);
-        } else {
-            Vec3 gradient;
-            if (wall.plate.distance_and_gradient(world.x[a], gradient) > world.radius[a] + skin) return;
-            append_nodes(world, slave, skin, [&](const Vec3& arm) { return wall.plate.distance_and_gradient(world.x[a] + arm, gradient); }, l);
-        }
-    }
-    if (l.node.size() == begin) return;
-    l.slave.push_back(slave);
-    l.master.push_back(master);
-    l.share.push_back(share);
-    l.owed.push_back(0.0);
-    l.start.push_back(Index(l.node.size()));
-    l.spring.resize(l.node.size(), Vec3::Zero());
-    l.touch.resize(l.node.size(), 0);
-    l.gradient.resize(l.node.size(), Vec3::Zero());
-    l.depth.resize(l.node.size(), 0.0);
-    // Springs of the same pair, if it was listed before: pairs and nodes are both in order.
-    std::size_t low = 0, high = old.slave.size();
-    const std::uint64_t key = key_of(slave, master);
-    while (low < high) {
-        const std::size_t middle = (low + high) / 2;
-        if (key_of(old.slave[middle], old.master[middle]) < key) low = middle + 1;
-        else high = middle;
-    }
-    if (low == old.slave.size() || key_of(old.slave[low], old.master[low]) != key) return;
-    l.owed.back() = old.owed[low];
-    Index k = old.start[low];
-    for (std::size_t m = begin; m < l.node.size(); ++m) {
-        while (k < old.start[low + 1] && old.node[std::size_t(k)] < l.node[m]) ++k;
-        if (k == old.start[low + 1]) break;
-        if (old.node[std::size_t(k)] != l.node[m]) continue;
-        l.spring[m] = old.spring[std::size_t(k)];
-        l.touch[m] = old.touch[std::size_t(k)];
-        l.gradient[m] = old.gradient[std::size_t(k)];
-        l.depth[m] = old.depth[std::size_t(k)];
-    }
-}
-
-void make_node_list(World::Impl& world, const std::vector<BroadPair>& pairs, double skin)
-{
-    struct Directed {
-        Index slave, master;
-        double share;
-    };
-    std::vector<Directed> directed;
-    for (const BroadPair& pair : pairs) {
-        const std::size_t a = std::size_t(pair.a), b = std::size_t(pair.b);
-        if (!world.has_nodes[a] || !world.has_nodes[b]) continue;
-        // Nodes of the body of smaller outer volume; ties go to the lower id.
-        const bool first = world.equivalent[a] <= world.equivalent[b];
-        const double share = world.options.two_way_nodes ? 0.5 : 1.0;
-        if (first || world.options.two_way_nodes) directed.push_back({pair.a, pair.b, share});
-        if (!first || world.options.two_way_nodes) directed.push_back({pair.b, pair.a, share});
-    }
-    for (std::size_t i = 0; i < world.x.size(); ++i)
-        if (world.has_nodes[i] && world.free(i))
-            for (std::size_t wall = 0; wall < world.walls.size(); ++wall) directed.push_back({Index(i), -1 - Index(wall), 1.0});
-    std::sort(directed.begin(), directed.end(),
-              [](const Directed& s, const Directed& t) { return key_of(s.slave, s.master) < key_of(t.slave, t.master); });
-    NodeList old = std::move(world.nodes);
-    NodeList& l = world.nodes;
-    l = {};
-    l.start.push_back(0);
-    for (const Directed& d : directed) append_pair(world, old, l, d.slave, d.master, skin, d.share);
-    l.arm.resize(l.node.size(), Vec3::Zero());
-    l.force.resize(l.node.size());
-    l.out.resize(l.slave.size());
 }
 
 }  // namespace
@@ -259,21 +148,32 @@ void World::Impl::make_lists()
     make_sphere_list(*this, pairs);
     make_sphere_wall_list(*this, skin);
     make_sphere_grid_list(*this, pairs, skin);
-    make_node_list(*this, pairs, skin);
+    list_nodes(&pairs);
+    make_blocks();
+    x_reference = x;
+    q_reference = q;
+    for (WallData& wall : walls) wall.reference = wall.point;
+    bool spheres_in = false, grids_in = false;
+    for (std::size_t i = 0; i < x.size(); ++i)
+        if (in[i]) (has_nodes[i] ? grids_in : spheres_in) = true;
+    mixed = spheres_in && grids_in;
+    lists_valid = true;
+    ++counters.rebuilds;
+    counters.seconds_lists += seconds_since(start);
+}
+
+// Room for what the blocks of the loops leave.
+void World::Impl::make_blocks()
+{
     const auto blocks = [](std::size_t n, std::size_t grain) { return (n + grain - 1) / grain; };
     out_count[0].assign(blocks(spheres.rows.size(), row_grain), 0);
     out_count[1].assign(blocks(sphere_walls.body.size(), entry_grain), 0);
     out_count[2].assign(blocks(sphere_grids.sphere.size(), grid_grain), 0);
-    const std::size_t points = out_count[0].size() + out_count[1].size() + out_count[2].size();
-    block_sums.assign(points + blocks(nodes.slave.size(), node_grain), LoopSums{});
-    crossings.resize(std::max(crossings.size(), block_sums.size()));
-    x_reference = x;
-    q_reference = q;
-    for (WallData& wall : walls) wall.reference = wall.point;
-    node_drift = 0.0;
-    lists_valid = true;
-    ++counters.rebuilds;
-    counters.seconds_lists += seconds_since(start);
+    out_count[3].assign(blocks(nodes.slave.size(), node_grain), 0);
+    std::size_t count = 0;
+    for (const auto& of : out_count) count += of.size();
+    block_sums.assign(count, LoopSums{});
+    crossings.resize(std::max(crossings.size(), count));
 }
 
 bool World::Impl::lists_expired() const
@@ -284,10 +184,8 @@ bool World::Impl::lists_expired() const
     for (std::size_t i = 0; i < x.size(); ++i) {
         const double moved2 = (x[i] - x_reference[i]).squaredNorm();
         if (moved2 > limit * limit) return true;
-        if (!has_nodes[i]) continue;
-        // |q - q'| is half the angle for small turns; either sign of q is the same turn.
-        const double turn = 2.0 * std::min((q[i].coeffs() - q_reference[i].coeffs()).norm(), (q[i].coeffs() + q_reference[i].coeffs()).norm());
-        if (std::sqrt(moved2) + turn * radius[i] > limit) return true;
+        if (!mixed || !has_nodes[i]) continue;
+        if (std::sqrt(moved2) + turn_between(q[i], q_reference[i]) * radius[i] > limit) return true;
     }
     return false;
 }

@@ -1,6 +1,7 @@
 // What a world reports: contacts, energies, statistics, friction springs; and its complete state as bytes.
 #include <algorithm>
 #include <cstring>
+#include <limits>
 
 #include "core/error.h"
 #include "dem/detail/impl.h"
@@ -32,8 +33,8 @@ void for_each_contact(const World::Impl& m, const Visit& visit)
         for (std::int32_t k = 0; k < m.out_count[1][block]; ++k) visit(m.sphere_walls.out[block * entry_grain + std::size_t(k)]);
     for (std::size_t block = 0; block < m.out_count[2].size(); ++block)
         for (std::int32_t k = 0; k < m.out_count[2][block]; ++k) visit(m.sphere_grids.out[block * grid_grain + std::size_t(k)]);
-    for (const GeneralForce& c : m.nodes.out)
-        if (c.points > 0) visit(c);
+    for (std::size_t block = 0; block < m.out_count[3].size(); ++block)
+        for (std::int32_t k = 0; k < m.out_count[3][block]; ++k) visit(m.nodes.out[block * node_grain + std::size_t(k)]);
 }
 
 }  // namespace
@@ -45,6 +46,22 @@ std::vector<Contact> World::contacts() const
     for_each_contact(*impl_, [&](const auto& c) { list.push_back(report(*impl_, c)); });
     std::stable_sort(list.begin(), list.end(), [](const Contact& a, const Contact& b) { return in_order(a.first, a.second, b.first, b.second); });
     return list;
+}
+
+// What the motion is owed in the middle of contacts: errors of work that wait for correction, and what velocity Verlet has in advance,
+//     K_{n+1} - K_n = 1/2 (F_n + F_{n+1}) . (x_{n+1} - x_n) + [dt^2/8 (F . F/m + T . I^-1 T)] between n and n+1.
+double World::Impl::on_account() const
+{
+    double owed = 0.0, advance = 0.0;
+    for (const double pair : nodes.owed) owed += pair;
+    for (const PressMemory& pair : sphere_grids.press) owed += pair.owed;
+    for (std::size_t i = 0; i < x.size(); ++i) {
+        if (!free(i)) continue;
+        const Vec3 f = force[i] + external_force[i] + mass[i] * options.gravity, t = torque[i] + external_torque[i];
+        const Vec3 inertia = i < added_mass.size() ? Vec3(added_mass[i].array() + mass[i]) : Vec3::Constant(mass[i]);
+        advance += f.dot(f.cwiseQuotient(inertia)) + t.dot(apply_inverse_inertia(i, t));
+    }
+    return owed - 0.125 * last_dt * last_dt * advance;
 }
 
 Energy World::energy() const
@@ -65,7 +82,7 @@ Energy World::energy() const
     e.wall_work = m.wall_work;
     e.friction = m.dissipated_friction;
     e.damping = m.dissipated_damping;
-    e.closure = e.stored() - (e.initial + e.gravity_work + e.external_work + e.wall_work - e.friction - e.damping);
+    e.closure = e.stored() + m.on_account() - m.initial_account - (e.initial + e.gravity_work + e.external_work + e.wall_work - e.friction - e.damping);
     return e;
 }
 
@@ -127,8 +144,7 @@ std::vector<ContactSpring> World::contact_springs() const
                 list.push_back({g.sphere[k], g.grid[k], slot, g.slots[k].spring[slot], g.slots[k].normal[slot]});
     const NodeList& n = m.nodes;
     for (std::size_t p = 0; p < n.slave.size(); ++p)
-        for (Index k = n.start[p]; k < n.start[p + 1]; ++k)
-            if (n.touch[std::size_t(k)]) list.push_back({n.slave[p], n.master[p], n.node[std::size_t(k)], n.spring[std::size_t(k)], Vec3::Zero()});
+        for (const NodeContact& c : n.contacts_of(p)) list.push_back({n.slave[p], n.master[p], c.node, c.spring, Vec3::Zero()});
     std::stable_sort(list.begin(), list.end(), [](const ContactSpring& a, const ContactSpring& b) {
         return a.first == b.first && a.second == b.second ? a.node < b.node : in_order(a.first, a.second, b.first, b.second);
     });
@@ -139,6 +155,7 @@ void World::set_contact_springs(std::span<const ContactSpring> springs)
 {
     Impl& m = *impl_;
     if (!m.lists_valid) m.make_lists();
+    std::vector<ContactSpring> of_nodes;
     for (const ContactSpring& s : springs) {
         const auto row = std::lower_bound(m.spheres.rows.begin(), m.spheres.rows.end(), s.first);
         if (row != m.spheres.rows.end() && *row == s.first && s.second >= 0) {
@@ -165,16 +182,9 @@ void World::set_contact_springs(std::span<const ContactSpring> springs)
                 slots.normal[s.node] = s.normal;
                 m.sphere_grids.touch[k] = 1;
             }
-        for (std::size_t p = 0; p < m.nodes.slave.size(); ++p) {
-            if (m.nodes.slave[p] != s.first || m.nodes.master[p] != s.second) continue;
-            const auto begin = m.nodes.node.begin() + m.nodes.start[p], end = m.nodes.node.begin() + m.nodes.start[p + 1];
-            const auto found = std::lower_bound(begin, end, s.node);
-            if (found == end || *found != s.node) continue;
-            const std::size_t k = std::size_t(found - m.nodes.node.begin());
-            m.nodes.spring[k] = s.spring;
-            m.nodes.touch[k] = 1;
-        }
+        of_nodes.push_back(s);
     }
+    m.nodes.take_springs(of_nodes);
     m.forces_valid = false;
 }
 
@@ -197,11 +207,8 @@ void World::Impl::drop_contacts(Index body)
             sphere_grids.touch[k] = 0;
         }
     for (std::size_t p = 0; p < nodes.slave.size(); ++p)
-        if (nodes.slave[p] == body || nodes.master[p] == body)
-            for (Index k = nodes.start[p]; k < nodes.start[p + 1]; ++k) {
-                nodes.spring[std::size_t(k)].setZero();
-                nodes.touch[std::size_t(k)] = 0;
-            }
+        if (nodes.slave[p] == body || nodes.master[p] == body) nodes.count[p] = 0;
+    if (std::size_t(body) < nodes.x_listed.size()) nodes.x_listed[std::size_t(body)].setConstant(std::numeric_limits<double>::quiet_NaN());
 }
 
 }  // namespace coral::dem

@@ -8,7 +8,7 @@ namespace coral::dem {
 
 namespace {
 
-constexpr std::uint64_t magic = 0x3330'4d45'4452'4f43;  // "CORDEM03"
+constexpr std::uint64_t magic = 0x3430'4d45'4452'4f43;  // "CORDEM04"
 constexpr std::uint64_t magic_name = 0x0000'ffff'ffff'ffff;  // the part without the version
 
 std::uint64_t checksum(std::span<const std::uint8_t> bytes)
@@ -68,10 +68,10 @@ struct Reader {
 template <class Archive>
 void visit_state(World::Impl& m, Archive& io)
 {
-    io(m.x), io(m.v), io(m.v_end), io(m.w), io(m.momentum), io(m.q), io(m.force), io(m.torque), io(m.external_force), io(m.external_torque), io(m.added_mass);
+    io(m.x), io(m.v), io(m.v_end), io(m.w), io(m.w_before), io(m.momentum), io(m.q), io(m.force), io(m.torque), io(m.external_force), io(m.external_torque), io(m.added_mass);
     io(m.scale), io(m.density), io(m.shape), io(m.material), io(m.motion), io(m.in);
     for (WallData& wall : m.walls) io(wall.point), io(wall.velocity), io(wall.force), io(wall.reference);
-    io(m.options.gravity), io(m.any_external), io(m.active), io(m.lists_valid), io(m.forces_valid), io(m.skin), io(m.x_reference), io(m.q_reference);
+    io(m.options.gravity), io(m.any_external), io(m.active), io(m.lists_valid), io(m.forces_valid), io(m.mixed), io(m.skin), io(m.x_reference), io(m.q_reference);
     SphereList& s = m.spheres;
     io(s.row), io(s.other), io(s.memory), io(s.touch), io(s.root_mass), io(s.out), io(s.rows);
     SphereWallList& w = m.sphere_walls;
@@ -79,9 +79,13 @@ void visit_state(World::Impl& m, Archive& io)
     SphereGridList& g = m.sphere_grids;
     io(g.sphere), io(g.grid), io(g.touch), io(g.slots), io(g.press), io(g.facet_start), io(g.facet), io(g.out);
     NodeList& n = m.nodes;
-    io(n.slave), io(n.master), io(n.start), io(n.node), io(n.spring), io(n.touch), io(n.gradient), io(n.arm), io(n.force), io(n.depth), io(n.clearance), io(n.owed), io(n.share), io(n.out);
-    io(m.out_count[0]), io(m.out_count[1]), io(m.out_count[2]), io(m.block_sums), io(m.sums), io(m.time);
-    io(m.dissipated_friction), io(m.dissipated_damping), io(m.gravity_work), io(m.external_work), io(m.wall_work), io(m.initial), io(m.ledger_started);
+    io(n.slave), io(n.master), io(n.start), io(n.share), io(n.node), io(n.clearance), io(n.least), io(n.owed), io(n.first), io(n.count), io(n.out);
+    io(n.skin), io(n.x_listed), io(n.q_listed), io(n.wall_listed), io(n.drift), io(n.wall_drift);
+    n.contacts.resize((n.slave.size() + node_grain - 1) / node_grain);
+    n.fresh.resize(n.contacts.size());
+    for (std::vector<NodeContact>& block : n.contacts) io(block);
+    io(m.out_count[0]), io(m.out_count[1]), io(m.out_count[2]), io(m.out_count[3]), io(m.block_sums), io(m.sums), io(m.time);
+    io(m.dissipated_friction), io(m.dissipated_damping), io(m.gravity_work), io(m.external_work), io(m.wall_work), io(m.initial), io(m.last_dt), io(m.initial_account), io(m.ledger_started);
     io(m.counters);
 }
 
@@ -115,7 +119,7 @@ void World::restore(std::span<const std::uint8_t> state)
     visit_state(m, in);
     for (std::size_t i = 0; i < m.x.size(); ++i) m.update_mass(i);
     m.crossings.resize(std::max(m.crossings.size(), m.block_sums.size()));
-    if (m.sphere_grids.press.size() == m.sphere_grids.grid.size())
+    if (m.options.sphere_scheme == SphereScheme::walls)
         for (const Index grid : m.sphere_grids.grid)
             if (m.shapes[std::size_t(m.shape[std::size_t(grid)])]->kind() == ShapeKind::grid) m.facets_of(m.shape[std::size_t(grid)]);
     m.spheres.make_room();

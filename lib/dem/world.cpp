@@ -162,6 +162,7 @@ int World::add_body(const BodySpec& spec)
     m.v.push_back(spec.motion == Motion::fixed ? Vec3(Vec3::Zero()) : spec.velocity);
     m.v_end.push_back(m.v.back());
     m.w.push_back(Vec3::Zero());
+    m.w_before.push_back(Vec3::Zero());
     m.momentum.push_back(Vec3::Zero());
     m.q.push_back(spec.orientation.normalized());
     for (std::vector<Vec3>* zero : {&m.force, &m.torque, &m.external_force, &m.external_torque, &m.principal}) zero->push_back(Vec3::Zero());

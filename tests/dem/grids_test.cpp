@@ -248,7 +248,7 @@ TEST(SphereOnGrid, friction_makes_a_ball_roll_down_a_grid_with_momentum_kept)
     EXPECT_LT((momentum(world) - p).norm() / p.norm(), 1e-11);
     EXPECT_LT((angular_momentum(world) - l).norm() / l.norm(), 1e-9);
     const Energy e = world.energy();
-    EXPECT_NEAR(e.closure, 0.0, 0.02 * e.initial);
+    EXPECT_NEAR(e.closure, 0.0, 1e-6 * e.initial);
 }
 
 TEST(SphereOnGrid, linked_rings_hold_each_other)

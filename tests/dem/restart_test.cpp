@@ -128,7 +128,7 @@ TEST(Ledger, closes_in_a_packing_that_falls_and_settles)
     world.advance(0.005, 1e-6);
     const Energy e = world.energy();
     RecordProperty("closure", std::to_string(e.closure / e.gravity_work));
-    EXPECT_LT(std::abs(e.closure), 0.02 * (e.initial + e.gravity_work));
+    EXPECT_LT(std::abs(e.closure), 1e-6 * (e.initial + e.gravity_work));
     EXPECT_GT(e.friction, 0.0);
     EXPECT_GT(e.damping, 0.0);
 }

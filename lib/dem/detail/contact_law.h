@@ -45,60 +45,55 @@ struct LoopSums {
 /// \param elastic   elastic part kn delta (times |grad Phi|) [N]
 /// \param approach  v_a at the end of the step, foreseen with the accelerations of its start: with the velocity of the middle
 ///                  the damping would lag half a step behind the spring, and stiffen it by zeta omega dt
-inline double normal_force(double elastic, double approach, const PairLaw& law, double root_mass, double dt, LoopSums& sums)
+inline double normal_force(double elastic, double approach, const PairLaw& law, double root_mass)
 {
     if (law.cn == 0.0) return elastic;
-    const double drag = law.cn * root_mass * approach;
-    if (elastic + drag <= 0.0) {
-        // The clamp lets the spring relax without pushing: what it held is lost at the rate it relaxes.
-        sums.damping -= elastic * approach * dt;
-        return 0.0;
-    }
-    sums.damping += drag * approach * dt;
-    return elastic + drag;
+    return std::max(elastic + law.cn * root_mass * approach, 0.0);
 }
 
-/// Advances a friction spring and returns the tangential force on the first body:
-///     s turns with the pair, s += v_t dt, |s| <= mu fn/kt;  F_t = -kt s - c_t v_t while it sticks, |F_t| <= mu fn
-/// \param velocity  tangential velocity of the first body against the second [m/s]
-/// \param root_mass  sqrt(m*)
-/// \param twist     mean spin of the pair about the normal [rad/s]
-/// \param share     part of the pair's force that this spring carries (1 for one-point contacts)
-[[gnu::always_inline]] inline Vec3 tangential_force(const PairLaw& law, double fn, const Vec3& n, const Vec3& velocity, double twist, double root_mass, double dt,
-                             double share, Vec3& spring, LoopSums& sums)
+/// How a place of contact slides in a step.
+struct Slide {
+    const PairLaw& law;
+    const Vec3& normal;          ///< at the end of the step
+    const Vec3& slide;           ///< tangential velocity in the middle of the step, seen from the geometry at its end [m/s]
+    const Vec3& old_slide;       ///< the same from the geometry at its start; zero for a new contact
+    double twist;                ///< mean spin of the pair about the normal [rad/s]
+    double root_mass;            ///< sqrt(m*)
+};
+/// Forces on the first body: of the spring, and with the dashpot.
+struct Friction {
+    Vec3 pull, total;
+};
+
+/// Advances a friction spring by half a step in the geometry of either end, turning it with the pair in between; it then stores just what
+/// the motion loses: s' = R (s + dt/2 u) + dt/2 u', |s'| <= mu fn/kt;  F_t = -kt s' - c_t u' while it sticks, |F_t| <= mu fn.
+inline Friction rub(const Slide& c, double fn, double dt, Vec3& spring)
 {
+    const PairLaw& law = c.law;
     if (law.friction == 0.0 || law.kt == 0.0) {
         spring.setZero();
-        return Vec3::Zero();
+        return {Vec3::Zero(), Vec3::Zero()};
     }
+    spring += 0.5 * dt * c.old_slide;
     const double length2 = spring.squaredNorm();
     if (length2 > 0.0) {
-        spring += (twist * dt) * n.cross(spring);
-        spring -= n.dot(spring) * n;
+        spring += (c.twist * dt) * c.normal.cross(spring);
+        spring -= c.normal.dot(spring) * c.normal;
         const double turned2 = spring.squaredNorm();
         if (turned2 > 0.0) spring *= std::sqrt(length2 / turned2);
     }
-    spring += velocity * dt;
-    const double limit = law.friction * fn / law.kt;
-    const double stretched2 = spring.squaredNorm();
+    spring += 0.5 * dt * c.slide;
+    const double bound = law.friction * fn, limit = bound / law.kt, stretched2 = spring.squaredNorm();
     if (stretched2 > limit * limit) {
-        const double stretched = std::sqrt(stretched2);
-        sums.friction += law.kt * share * limit * (stretched - limit);
-        spring *= limit / stretched;
-        sums.elastic_tangential += 0.5 * law.kt * share * limit * limit;
-        return -law.kt * share * spring;
+        spring *= limit / std::sqrt(stretched2);
+        const Vec3 pull = -law.kt * spring;
+        return {pull, pull};
     }
-    sums.elastic_tangential += 0.5 * law.kt * share * stretched2;
-    Vec3 force = -law.kt * spring;
-    if (law.damping > 0.0) {
-        const Vec3 drag = (-law.ct * root_mass) * velocity;
-        Vec3 total = force + drag;
-        const double size2 = total.squaredNorm(), bound = law.friction * fn;
-        if (size2 > bound * bound) total *= bound / std::sqrt(size2);
-        sums.damping -= share * (total - force).dot(velocity) * dt;
-        force = total;
-    }
-    return share * force;
+    const Vec3 pull = -law.kt * spring;
+    Vec3 total = pull - (law.ct * c.root_mass) * c.slide;
+    const double size2 = total.squaredNorm();
+    if (size2 > bound * bound) total *= bound / std::sqrt(size2);
+    return {pull, total};
 }
 
 /// c of the node potential [docs/numerics.md, contact].

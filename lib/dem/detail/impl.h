@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cstdint>
 #include <map>
+#include <span>
 #include <vector>
 
 #include "dem/detail/contact_law.h"
@@ -108,41 +109,87 @@ struct Slots {
     Vec3 normal[count] = {Vec3::Zero(), Vec3::Zero(), Vec3::Zero(), Vec3::Zero(), Vec3::Zero(), Vec3::Zero()};
     std::uint8_t used = 0, next = 0;
 };
-/// Of the last step, where all walls push (SphereScheme::walls).
-struct WallPress {
-    Vec3 push = Vec3::Zero();  ///< elastic force on the sphere, frame of the grid [N]
-    double energy = 0.0;       ///< stored [J]
-    double owed = 0.0;         ///< error of the work that waits for correction [J]
+/// Force on the sphere of a pair, with its torques about the centres of both (that on the grid is of the counterforce).
+struct Wrench {
+    Vec3 force = Vec3::Zero(), torque_a = Vec3::Zero(), torque_b = Vec3::Zero();
+    void add(const Vec3& f, const Vec3& arm_a, const Vec3& arm_b)
+    {
+        force += f;
+        torque_a += arm_a.cross(f);
+        torque_b -= arm_b.cross(f);
+    }
+    double power(const Vec3& velocity, const Vec3& spin_a, const Vec3& spin_b) const
+    {
+        return force.dot(velocity) + torque_a.dot(spin_a) + torque_b.dot(spin_b);
+    }
+};
+/// What a sphere on a grid keeps from one step to the next: its forces by kind, and what springs hold.
+struct PressMemory {
+    Wrench push, pull, drag;  ///< elastic, of friction springs, of dashpots
+    double stored = 0, stretched = 0;  ///< in the elastic contact and in the friction springs [J]
+    double owed = 0.0;                 ///< error of the work that waits for correction [J]
 };
 struct SphereGridList {
     std::vector<Index> sphere, grid;
     std::vector<std::uint8_t> touch;
     std::vector<Slots> slots;
-    std::vector<WallPress> press;           ///< these three: empty unless all walls push
-    std::vector<Index> facet_start, facet;  ///< triangles within the skin; facet_start has one more entry
+    std::vector<PressMemory> press;
+    std::vector<Index> facet_start, facet;  ///< triangles within the skin, where all walls push; facet_start has one more entry
     std::vector<GeneralForce> out;
 };
 
-/// Nodes of `slave` that are near `master` (a grid, or wall -1 - master).
+/// A surface node that touches, and what it keeps from one step to the next: all at the end of the last step, world frame.
+struct NodeContact {
+    Index node = 0;
+    std::uint8_t touch = 0;              ///< 1 touching, 2 touching without force (clamped)
+    double depth = 0, stiffness = 0;     ///< stiffness: k_a A
+    double force = 0;                    ///< along the gradient's direction; elastic, then with the dashpot's part
+    Vec3 arm = Vec3::Zero();             ///< node - position of the slave
+    Vec3 gradient = Vec3::Zero();        ///< not normalised
+    Vec3 spring = Vec3::Zero();
+    Vec3 pull = Vec3::Zero();            ///< force of the spring
+    Vec3 drag = Vec3::Zero();            ///< force of dashpots and of what holds them back: its work is dissipated
+};
+
+/// Nodes of `slave` that are near `master` (a grid, or wall -1 - master). Pairs are in order; a pair without near nodes is listed as well,
+/// so that it is known to have been looked at.
 struct NodeList {
     std::vector<Index> slave, master, start;  ///< start has one more entry
-    std::vector<Index> node;
-    std::vector<Vec3> spring;
-    std::vector<std::uint8_t> touch;          ///< 0 apart, 1 touching, 2 touching without force (clamped)
-    std::vector<Vec3> gradient, arm;          ///< of the last step, world frame
-    std::vector<double> force, depth;         ///< of the last step
-    std::vector<double> clearance;            ///< distance when the list was made [m]
-    std::vector<double> owed;                 ///< per pair: error of its work that waits for correction [J]
     std::vector<double> share;                ///< 1, or 1/2 for the two directions of a pair
+    std::vector<Index> node;                  ///< of a pair: ascending
+    std::vector<float> clearance;             ///< distance when it was listed, rounded down [m]
+    std::vector<float> least;                 ///< clearance of a pair; infinite without near nodes
+    std::vector<double> owed;                 ///< per pair: error of its work that waits for correction [J]
+    std::vector<Index> first, count;          ///< contacts of a pair, within those of its block
+    std::vector<std::vector<NodeContact>> contacts, fresh;  ///< per block; fresh is for the loop
     std::vector<GeneralForce> out;
+    double skin = 0;                          ///< of these lists [m]
+    // Where bodies and walls were when the pairs they are in were last looked at, and how far their points have come since (or more).
+    std::vector<Vec3> x_listed, wall_listed;
+    std::vector<Quat> q_listed;
+    std::vector<double> drift, wall_drift;
+    std::span<const NodeContact> contacts_of(std::size_t pair) const;
+    /// Springs for pairs of the list, as new contacts; others are ignored.
+    void take_springs(std::vector<ContactSpring> springs);
+    double drift_of(Index master_or_wall) const
+    {
+        return master_or_wall < 0 ? wall_drift[std::size_t(-1 - master_or_wall)] : drift[std::size_t(master_or_wall)];
+    }
 };
 
 /// Share of the skin that a body may move before the lists are made anew: below one half, for trilinear distances may rise
 /// a little faster than the way.
 constexpr double free_path = 0.4;
+/// Skin of the lists of nodes / that of the spheres.
+constexpr double node_skin = 0.4;
 
 // Large enough that a small world runs in one block, without threads.
-constexpr std::size_t row_grain = 1024, entry_grain = 2048, grid_grain = 512, node_grain = 8;
+constexpr std::size_t row_grain = 1024, entry_grain = 2048, grid_grain = 512, node_grain = 16;
+
+/// Pair of the broad phase.
+struct BroadPair {
+    Index a, b;
+};
 
 struct World::Impl {
     WorldOptions options;
@@ -155,6 +202,7 @@ struct World::Impl {
 
     // Bodies.
     std::vector<Vec3> x, v, w, momentum;  ///< momentum: angular, world frame
+    std::vector<Vec3> w_before;           ///< angular velocity in the middle of the step, before the turn of its way (bodies with nodes)
     std::vector<Vec3> v_end;              ///< velocity foreseen at the end of the step, for damping
     std::vector<Quat> q;
     std::vector<Vec3> force, torque;      ///< of contacts
@@ -176,20 +224,21 @@ struct World::Impl {
     double skin = 0;
     std::vector<Vec3> x_reference;
     std::vector<Quat> q_reference;
-    double node_drift = 0;  ///< longest way of a wall, or of a point of a body with nodes, since the lists were made (or more) [m]
+    bool mixed = false;  ///< spheres and grids are both there
     SphereList spheres;
     SphereWallList sphere_walls;
     SphereGridList sphere_grids;
     NodeList nodes;
 
     // Results of the last force computation.
-    std::vector<std::int32_t> out_count[3];  ///< per block of spheres, sphere_walls, sphere_grids
+    std::vector<std::int32_t> out_count[4];  ///< per block of spheres, sphere_walls, sphere_grids, nodes
     std::vector<LoopSums> block_sums;
     std::vector<std::vector<Crossing>> crossings;  ///< per block
     LoopSums sums;
     double time = 0;
     double dissipated_friction = 0, dissipated_damping = 0, gravity_work = 0, external_work = 0, wall_work = 0, initial = 0;
-    double lost_energy = 0;
+
+    double last_dt = 0, initial_account = 0;
     bool ledger_started = false;
     Counters counters;
 
@@ -206,13 +255,20 @@ struct World::Impl {
     Vec3 apply_inverse_inertia(std::size_t i, const Vec3& torque) const;
     double kinetic_energy(std::size_t i) const;
     double kinetic_energy() const;
+    double on_account() const;
     std::string name(std::size_t i) const;
 
     // lists.cpp
     void make_lists();
+    void make_blocks();
     const detail::Facets& facets_of(Index shape_id);
     void drop_contacts(Index body);
     bool lists_expired() const;
+
+    // lists_nodes.cpp
+    /// Lists the nodes of these pairs; those whose bodies have hardly moved keep theirs. Without pairs: of the present ones.
+    void list_nodes(const std::vector<BroadPair>* pairs);
+    double drift_since_listed(std::size_t i) const;
 
     // contacts_*.cpp: forces at the present positions; springs advance by dt.
     void compute_contacts(double dt);
@@ -220,6 +276,8 @@ struct World::Impl {
     void sphere_wall_loop(double dt);
     void sphere_grid_loop(double dt);
     bool press_on_walls(std::size_t k, double dt, GeneralForce& out, LoopSums& s, std::vector<Crossing>& crossing);
+    bool press_on_nearest(std::size_t k, double dt, GeneralForce& out, LoopSums& s, std::vector<Crossing>& crossing);
+    void close_books(std::size_t k, const PressMemory& now, bool clamped, double dt, GeneralForce& out, LoopSums& s, std::vector<Crossing>& crossing);
     void node_loop(double dt);
     void sum_forces();
     void refresh_forces();
@@ -229,7 +287,10 @@ struct World::Impl {
     void kick(double dt);
     void kick_body(std::size_t i, double dt, const Vec3& g_dt);
     void kick_with_added_mass(std::size_t i, double dt);
-    bool kick_and_drift(double dt);
+    struct Worn {
+        bool lists, nodes;
+    };
+    Worn kick_and_drift(double dt);
     void turn_grid(std::size_t i, double dt);
     void correct_crossings();
     void check_numbers() const;
@@ -242,10 +303,15 @@ struct World::Impl {
 
 /// Broad phase: pairs a < b of active bodies with |x_a - x_b| < radius_a + radius_b + skin, ordered; pairs of bodies that both do not
 /// move freely are left out. Cells by size class (factor 2), so that wide gradations cost no more than narrow ones.
-struct BroadPair {
-    Index a, b;
-};
 std::vector<BroadPair> broad_phase(const World::Impl& world, double skin);
+
+inline std::uint64_t key_of(Index a, Index b) { return std::uint64_t(std::uint32_t(a)) << 32 | std::uint32_t(b); }
+
+/// Angle between two orientations, or a little less [rad]: |q - q'| is half of it for small ones, and either sign of q is the same.
+inline double turn_between(const Quat& a, const Quat& b)
+{
+    return 2.0 * std::min((a.coeffs() - b.coeffs()).norm(), (a.coeffs() + b.coeffs()).norm());
+}
 
 inline double seconds_since(std::chrono::steady_clock::time_point start)
 {

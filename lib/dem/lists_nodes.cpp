@@ -1,0 +1,209 @@
+// Lists of surface nodes near a partner. A pair is looked at anew when one of its bodies has moved; the others keep their nodes, so that
+// a few loose grains do not cost a whole packing.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "dem/detail/impl.h"
+
+namespace coral::dem {
+
+namespace {
+
+/// Lattices may rise a little faster than the way.
+constexpr double steepest = 1.25;
+
+struct Directed {
+    Index slave, master;
+    double share;
+};
+
+std::vector<Directed> direct(const World::Impl& world, const std::vector<BroadPair>& pairs)
+{
+    std::vector<Directed> directed;
+    for (const BroadPair& pair : pairs) {
+        const std::size_t a = std::size_t(pair.a), b = std::size_t(pair.b);
+        if (!world.has_nodes[a] || !world.has_nodes[b]) continue;
+        // Nodes of the body of smaller outer volume; ties go to the lower id.
+        const bool first = world.equivalent[a] <= world.equivalent[b];
+        const double share = world.options.two_way_nodes ? 0.5 : 1.0;
+        if (first || world.options.two_way_nodes) directed.push_back({pair.a, pair.b, share});
+        if (!first || world.options.two_way_nodes) directed.push_back({pair.b, pair.a, share});
+    }
+    Vec3 gradient;
+    for (std::size_t i = 0; i < world.x.size(); ++i) {
+        if (!world.has_nodes[i] || !world.free(i)) continue;
+        for (std::size_t wall = 0; wall < world.walls.size(); ++wall) {
+            const WallData& data = world.walls[wall];
+            const double height = data.kind == WallData::Kind::plane ? data.normal.dot(world.x[i] - data.point)
+                                                                     : data.plate.distance_and_gradient(world.x[i], gradient);
+            if (height < world.radius[i] + world.skin) directed.push_back({Index(i), -1 - Index(wall), 1.0});
+        }
+    }
+    std::sort(directed.begin(), directed.end(), [](const Directed& s, const Directed& t) { return key_of(s.slave, s.master) < key_of(t.slave, t.master); });
+    return directed;
+}
+
+/// Nodes of `slave` within `reach` of a partner, tested cluster by cluster; clearances are less by `shift`.
+template <class Distance>
+void append_nodes(const World::Impl& world, Index slave, double reach, double shift, const Distance& distance, NodeList& l)
+{
+    const std::size_t a = std::size_t(slave);
+    const Shape& shape = *world.shapes[std::size_t(world.shape[a])];
+    const double scale = world.scale[a];
+    const Eigen::Matrix3d rotation = scale * world.q[a].toRotationMatrix();
+    const auto near = [&](const Shape::Cluster& c) { return distance(rotation * c.centre) <= 1.05 * scale * c.radius + reach; };
+    for (const Shape::Cluster& group : shape.groups()) {
+        if (!near(group)) continue;
+        for (int c = group.begin; c < group.end; ++c) {
+            const Shape::Cluster& cluster = shape.clusters()[std::size_t(c)];
+            if (!near(cluster)) continue;
+            for (int n = cluster.begin; n < cluster.end; ++n)
+                if (const double d = distance(rotation * shape.nodes()[std::size_t(n)]); d < reach) {
+                    l.node.push_back(n);
+                    l.clearance.push_back(std::nextafter(float(d - shift), -std::numeric_limits<float>::infinity()));
+                }
+        }
+    }
+}
+
+void look_at(const World::Impl& world, const Directed& d, NodeList& l)
+{
+    const std::size_t a = std::size_t(d.slave);
+    // What the two have come since their drift counts from is reckoned once more later on.
+    const double shift = steepest * (l.drift_of(d.slave) + l.drift_of(d.master)), reach = l.skin + shift;
+    if (d.master >= 0) {
+        const std::size_t b = std::size_t(d.master);
+        const Vec3 to_b = world.periodic(world.x[a] - world.x[b]);
+        const double scale = world.scale[b];
+        const Eigen::Matrix3d to_local = world.q[b].toRotationMatrix().transpose() / scale;
+        const detail::DistanceField field(*world.shapes[std::size_t(world.shape[b])]);
+        append_nodes(world, d.slave, reach, shift, [&](const Vec3& arm) { return scale * field.lower_bound(to_local * (to_b + arm)); }, l);
+        return;
+    }
+    const WallData& wall = world.walls[std::size_t(-1 - d.master)];
+    if (wall.kind == WallData::Kind::plane) {
+        const double height = wall.normal.dot(world.x[a] - wall.point);
+        append_nodes(world, d.slave, reach, shift, [&](const Vec3& arm) { return height + wall.normal.dot(arm); }, l);
+    } else {
+        Vec3 gradient;
+        append_nodes(world, d.slave, reach, shift, [&](const Vec3& arm) { return wall.plate.distance_and_gradient(world.x[a] + arm, gradient); }, l);
+    }
+}
+
+}  // namespace
+
+std::span<const NodeContact> NodeList::contacts_of(std::size_t pair) const
+{
+    return {contacts[pair / node_grain].data() + first[pair], std::size_t(count[pair])};
+}
+
+void NodeList::take_springs(std::vector<ContactSpring> springs)
+{
+    const auto key = [](const ContactSpring& s) { return std::pair(key_of(s.first, s.second), s.node); };
+    std::sort(springs.begin(), springs.end(), [&](const ContactSpring& s, const ContactSpring& t) { return key(s) < key(t); });
+    auto next = springs.begin();
+    for (std::size_t p = 0; p < slave.size(); ++p) {
+        if (p % node_grain == 0) contacts[p / node_grain].clear();
+        std::vector<NodeContact>& of_block = contacts[p / node_grain];
+        first[p] = Index(of_block.size());
+        const std::uint64_t pair = key_of(slave[p], master[p]);
+        while (next != springs.end() && key_of(next->first, next->second) < pair) ++next;
+        for (; next != springs.end() && key_of(next->first, next->second) == pair; ++next) {
+            NodeContact c;
+            c.node = next->node;
+            c.touch = 1;
+            c.spring = next->spring;
+            of_block.push_back(c);
+        }
+        count[p] = Index(of_block.size()) - first[p];
+    }
+}
+
+double World::Impl::drift_since_listed(std::size_t i) const
+{
+    return (x[i] - nodes.x_listed[i]).norm() + turn_between(q[i], nodes.q_listed[i]) * radius[i];
+}
+
+void World::Impl::list_nodes(const std::vector<BroadPair>* pairs)
+{
+    const auto start = std::chrono::steady_clock::now();
+    std::vector<Directed> directed;
+    if (pairs) directed = direct(*this, *pairs);
+    else
+        for (std::size_t p = 0; p < nodes.slave.size(); ++p) directed.push_back({nodes.slave[p], nodes.master[p], nodes.share[p]});
+    NodeList old = std::move(nodes);
+    NodeList& l = nodes;
+    l = {};
+    l.skin = node_skin * skin;
+    constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+    l.x_listed = std::move(old.x_listed);
+    l.q_listed = std::move(old.q_listed);
+    l.wall_listed = std::move(old.wall_listed);
+    l.x_listed.resize(x.size(), Vec3::Constant(unknown));
+    l.q_listed.resize(x.size(), Quat::Identity());
+    l.wall_listed.resize(walls.size(), Vec3::Constant(unknown));
+    l.drift.assign(x.size(), 0.0);
+    l.wall_drift.assign(walls.size(), 0.0);
+    // Whoever has used up half of the way is looked at anew, so that the lists last a while.
+    const double keeps = l.skin == old.skin ? 0.5 * free_path * l.skin : -1.0;
+    std::vector<std::uint8_t> moved(x.size(), 0), wall_moved(walls.size(), 0);
+    for (std::size_t i = 0; i < x.size(); ++i) {
+        if (!in[i] || !has_nodes[i]) continue;
+        l.drift[i] = drift_since_listed(i);
+        if (l.drift[i] <= keeps) continue;
+        moved[i] = 1;
+        l.x_listed[i] = x[i];
+        l.q_listed[i] = q[i];
+        l.drift[i] = 0.0;
+    }
+    for (std::size_t k = 0; k < walls.size(); ++k) {
+        l.wall_drift[k] = (walls[k].point - l.wall_listed[k]).norm();
+        if (l.wall_drift[k] <= keeps) continue;
+        wall_moved[k] = 1;
+        l.wall_listed[k] = walls[k].point;
+        l.wall_drift[k] = 0.0;
+    }
+
+    l.start.push_back(0);
+    l.node.reserve(old.node.size() + old.node.size() / 8);
+    l.clearance.reserve(l.node.capacity());
+    l.contacts.resize((directed.size() + node_grain - 1) / node_grain);
+    l.fresh.resize(l.contacts.size());
+    std::size_t o = 0;
+    for (const Directed& d : directed) {
+        while (o < old.slave.size() && key_of(old.slave[o], old.master[o]) < key_of(d.slave, d.master)) ++o;
+        const bool known = o < old.slave.size() && old.slave[o] == d.slave && old.master[o] == d.master;
+        const bool stays = known && !moved[std::size_t(d.slave)] && !(d.master < 0 ? wall_moved[std::size_t(-1 - d.master)] : moved[std::size_t(d.master)]);
+        const std::size_t begin = l.node.size();
+        if (stays) {
+            l.node.insert(l.node.end(), old.node.begin() + old.start[o], old.node.begin() + old.start[o + 1]);
+            l.clearance.insert(l.clearance.end(), old.clearance.begin() + old.start[o], old.clearance.begin() + old.start[o + 1]);
+        } else {
+            look_at(*this, d, l);
+        }
+        float least = std::numeric_limits<float>::infinity();
+        for (std::size_t k = begin; k < l.node.size(); ++k) least = std::min(least, l.clearance[k]);
+        std::vector<NodeContact>& contacts = l.contacts[l.slave.size() / node_grain];
+        l.first.push_back(Index(contacts.size()));
+        l.count.push_back(known ? old.count[o] : 0);
+        if (known && old.count[o] > 0) {
+            const auto from = old.contacts[o / node_grain].begin() + old.first[o];
+            contacts.insert(contacts.end(), from, from + old.count[o]);
+        }
+        l.owed.push_back(known ? old.owed[o] : 0.0);
+        l.slave.push_back(d.slave);
+        l.master.push_back(d.master);
+        l.share.push_back(d.share);
+        l.least.push_back(least);
+        l.start.push_back(Index(l.node.size()));
+    }
+    l.out.resize(l.slave.size());
+    if (!pairs) {
+        make_blocks();
+        counters.seconds_lists += seconds_since(start);
+        ++counters.rebuilds;
+    }
+}
+
+}  // namespace coral::dem
