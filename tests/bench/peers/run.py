@@ -12,6 +12,7 @@ import math
 import os
 import re
 import shutil
+import statistics
 import subprocess
 import sys
 
@@ -169,8 +170,9 @@ def check_bed(scene, rows):
 
 
 def compare(entries, warm, steps, repeat):
-    """Least CPU time of each entry at its best skin; the rounds go through all entries, so that load falls on all alike."""
-    best = {}
+    """Least CPU time of each entry at its best skin, and the median over the rounds of its time / that of the first: the rounds go through all
+    entries, so that load falls on all alike."""
+    best, rounds = {}, collections.defaultdict(list)
     for entry in entries:
         part = max(1, steps[entry] // 5)
         tried = [(entry.run(skin, warm[entry] // 4, part).cpu / part, skin) for skin in entry.skins] if len(entry.skins) > 1 else [(0, entry.skins[0])]
@@ -179,10 +181,12 @@ def compare(entries, warm, steps, repeat):
     for turn in range(repeat):
         for entry in entries:
             result = entry.run(entry.skin, warm[entry], steps[entry])
+            rounds[entry].append(result.cpu / steps[entry])
             print(f"round {turn + 1}, {entry.name}: {1e6 * result.cpu / steps[entry]:.1f} us/step", file=sys.stderr, flush=True)
             if entry not in best or result.cpu < best[entry].cpu:
                 best[entry] = result._replace(state=result.state() if result.state and entry.keeps_state else None)
-    return best
+    ratios = {entry: statistics.median(a / b for a, b in zip(rounds[entry], rounds[entries[0]])) for entry in entries}
+    return best, ratios
 
 
 def row(*cells):
@@ -236,19 +240,20 @@ def compare_spheres(options, scene):
         entry.keeps_state = True
     warm = {entry: options.warm for entry in entries}
     steps = {entry: options.steps for entry in entries}
-    best = compare(entries, warm, steps, options.repeat)
-    print(f"\n{len(rows)} spheres, {options.steps} steps after {options.warm}, gravity ({', '.join(f'{g:.3g}' for g in header['gravity'])}) m/s2, least of {options.repeat} rounds\n")
-    row("code", "version", "skin [mm]", "steps/s per core (CPU)", "ours is faster by", "us/step wall", "contacts", "mean overlap [nm]", "kinetic energy [J]",
+    best, ratios = compare(entries, warm, steps, options.repeat)
+    gravity = ", ".join(f"{g:.3g}" for g in header["gravity"])
+    print(f"\n{len(rows)} spheres, {options.steps} steps after {options.warm}, gravity ({gravity}) m/s2, least of {options.repeat} rounds\n")
+    row("code", "version", "skin [mm]", "steps/s per core (CPU)", "time / ours", "median of rounds", "contacts", "mean overlap [nm]", "kinetic energy [J]",
         "mean way [um]")
     row(*["---"] * 10)
     ours = best[entries[0]]
     for entry in entries:
         result, check = best[entry], check_bed(scene, best[entry].state)
-        wall = f"{1e6 * result.wall / options.steps:.1f}" if result.wall else "-"
-        row(entry.name, entry.version(), f"{1e3 * entry.skin:g}", f"{options.steps / result.cpu:.0f}", f"{result.cpu / ours.cpu:.2f}", wall,
-            check["contacts"], f"{1e9 * check['overlap']:.2f}", f"{check['kinetic']:.1e}", f"{1e6 * check['way']:.2f}")
-    parts = ours.report
-    print(f"\nOurs, wall seconds: pairs {parts['seconds_pairs']:.3f}, integration {parts['seconds_integration']:.3f}, lists {parts['seconds_lists']:.3f}; "
+        row(entry.name, entry.version(), f"{1e3 * entry.skin:g}", f"{options.steps / result.cpu:.0f}", f"{result.cpu / ours.cpu:.2f}",
+            f"{ratios[entry]:.2f}", check["contacts"], f"{1e9 * check['overlap']:.2f}", f"{check['kinetic']:.1e}", f"{1e6 * check['way']:.2f}")
+    parts, two = ours.report, best[entries[1]]
+    print(f"\nOurs, two threads: {options.steps / two.wall:.0f} steps/s of wall time, {ours.wall / two.wall:.2f} times one thread's")
+    print(f"Ours, wall seconds: pairs {parts['seconds_pairs']:.3f}, integration {parts['seconds_integration']:.3f}, lists {parts['seconds_lists']:.3f}; "
           f"{parts['pair_tests']:.0f} listed pairs, {parts['rebuilds']} rebuilds")
 
 
@@ -266,17 +271,19 @@ def grains(options):
     few = lambda entry: isinstance(entry, Yade)
     warm = {entry: 20 if few(entry) else options.warm for entry in entries}
     steps = {entry: 60 if few(entry) else options.steps for entry in entries}
-    best = compare(entries, warm, steps, options.repeat)
+    best, ratios = compare(entries, warm, steps, options.repeat)
     print(f"\n{count} level-set grains, least of {options.repeat} rounds\n")
-    row("code", "version", "skin [mm]", "steps", "us/step (CPU)", "us/step wall", "us per grain and step", "contacts", "us per contact and step",
-        "ours is cheaper by")
-    row(*["---"] * 10)
+    row("code", "version", "skin [mm]", "steps", "us/step (CPU)", "us/step wall", "us per grain and step", "contacts", "mean overlap [um]",
+        "us per contact and step", "cost / ours", "median of rounds")
+    row(*["---"] * 12)
     cost = lambda entry: 1e6 * best[entry].cpu / steps[entry]
     per_contact = lambda entry: cost(entry) / best[entry].report["contacts"]
     for entry in entries:
         result = best[entry]
         row(entry.name, entry.version(), f"{1e3 * entry.skin:g}", steps[entry], f"{cost(entry):.1f}", f"{1e6 * result.wall / steps[entry]:.1f}",
-            f"{cost(entry) / count:.2f}", f"{result.report['contacts']:.0f}", f"{per_contact(entry):.2f}", f"{per_contact(entry) / per_contact(entries[0]):.1f}")
+            f"{cost(entry) / count:.2f}", f"{result.report['contacts']:.0f}", f"{1e6 * result.report['mean_overlap']:.1f}",
+            f"{per_contact(entry):.2f}", f"{per_contact(entry) / per_contact(entries[0]):.1f}",
+            f"{ratios[entry] * best[entries[0]].report['contacts'] / result.report['contacts']:.1f}")
     parts = best[entries[0]].report
     print(f"\nOurs, wall seconds: pairs {parts['seconds_pairs']:.3f}, integration {parts['seconds_integration']:.3f}, lists {parts['seconds_lists']:.3f}; "
           f"{parts['node_tests']:.0f} node tests a step, {parts['rebuilds']} rebuilds")

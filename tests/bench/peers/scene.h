@@ -107,23 +107,25 @@ inline double cpu_seconds()
 /// Steps the world, unmeasured first, and prints one JSON object with the cost of the measured steps.
 inline void measure(dem::World& world, double dt, int warm, int steps)
 {
-    for (int i = 0; i < warm; ++i) world.step(dt);
+    world.advance(warm * dt, dt);
     const dem::Counters before = world.counters();
     const double cpu = cpu_seconds();
-    const double wall = seconds([&] {
-        for (int i = 0; i < steps; ++i) world.step(dt);
-    });
+    const double wall = seconds([&] { world.advance(steps * dt, dt); });
     const double used = cpu_seconds() - cpu;
     const dem::Counters& after = world.counters();
+    if (after.steps - before.steps != steps) throw Error("peers", "another number of steps", "look at World::advance");
     const dem::Statistics statistics = world.statistics();
+    double overlap = 0;
+    const std::vector<dem::Contact> contacts = world.contacts();
+    for (const dem::Contact& contact : contacts) overlap += contact.overlap / static_cast<double>(contacts.size());
     const auto per_step = [&](auto counted) { return double(counted) / steps; };
     std::printf("{\"steps\": %d, \"cpu\": %.6f, \"wall\": %.6f, \"contacts\": %.1f, \"pair_tests\": %.1f, \"node_tests\": %.1f, \"rebuilds\": %lld, "
-                "\"seconds_pairs\": %.4f, \"seconds_integration\": %.4f, \"seconds_lists\": %.4f, \"kinetic_energy\": %.4g, \"max_speed\": %.4g, "
-                "\"unbalanced_ratio\": %.4g}\n",
+                "\"seconds_pairs\": %.4f, \"seconds_integration\": %.4f, \"seconds_lists\": %.4f, \"mean_overlap\": %.6g, \"kinetic_energy\": %.4g, "
+                "\"max_speed\": %.4g, \"unbalanced_ratio\": %.4g}\n",
                 steps, used, wall, per_step(after.contacts - before.contacts), per_step(after.pair_tests - before.pair_tests),
                 per_step(after.node_tests - before.node_tests), static_cast<long long>(after.rebuilds - before.rebuilds),
                 after.seconds_pairs - before.seconds_pairs, after.seconds_integration - before.seconds_integration,
-                after.seconds_lists - before.seconds_lists, statistics.kinetic_energy, statistics.max_speed, statistics.unbalanced_ratio);
+                after.seconds_lists - before.seconds_lists, overlap, statistics.kinetic_energy, statistics.max_speed, statistics.unbalanced_ratio);
 }
 
 /// Runs until next to nothing moves: kinetic energy below that of a fall of all bodies by 1e-6 of their radius. Speeds are set to zero from time to
