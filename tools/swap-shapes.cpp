@@ -33,6 +33,7 @@ void declare(cli::Options& options, Options& o)
     options.flag("--drop-trapped", o.swap.drop_trapped, "Take out fines that a filled void covers; else they are moved to its surface");
     options.add("--limit", o.swap.limit, "Largest displacement of a coarse grain, and mean one of the fines, over the diameter").not_negative();
     options.add("--overlap-limit", o.swap.overlap_limit, "Largest overlap that may stay, over the smaller diameter").not_negative();
+    options.flag("--restore-pressure", o.swap.restore_pressure, "Move the walls until each pair has the pressure it had");
     options.add("--steps", o.swap.max_steps, "Longest damped run [steps]").between(0, 10000000);
 }
 
@@ -44,7 +45,7 @@ std::optional<pack::ShapeKind> kind_of(const std::string& word)
 }
 
 nlohmann::ordered_json to_json(const pack::Overlaps& o) { return {{"contacts", o.contacts}, {"deep", o.deep}, {"largest", o.largest}}; }
-nlohmann::ordered_json to_json(const pack::Displacement& d) { return {{"mean", d.mean}, {"largest", d.largest}}; }
+nlohmann::ordered_json to_json(const pack::Displacement& d) { return {{"grains", d.grains}, {"mean", d.mean}, {"median", d.median}, {"largest", d.largest}}; }
 
 nlohmann::ordered_json to_json(const pack::Sample& sample, const pack::SwapReport& r, const Options& o)
 {
@@ -57,7 +58,8 @@ nlohmann::ordered_json to_json(const pack::Sample& sample, const pack::SwapRepor
     json["kept"] = o.keep;
     json["mass_before"] = r.mass_before;
     json["mass_after"] = r.mass_after;
-    json["displacement"] = {{"coarse", to_json(r.coarse)}, {"fine", to_json(r.fine)}};
+    json["displacement"] = {{"coarse", to_json(r.coarse)}, {"fine", to_json(r.fine)}, {"loaded_fine", to_json(r.loaded_fine)}};
+    json["strain"] = {r.strain.x(), r.strain.y(), r.strain.z()};
     json["pushed_fines"] = r.pushed_fines;
     json["trapped"] = r.trapped;
     json["trapped_dropped"] = o.swap.drop_trapped;
@@ -86,8 +88,11 @@ std::string to_text(const pack::Sample& sample, const pack::SwapReport& r, const
     line("kept", fmt::format("centres, orientations and {}; the mass of all grains changes by {:+.2f} %", o.keep == "mass" ? "masses" : "apparent volumes",
                              100 * (r.mass_after / r.mass_before - 1)));
     if (r.largest_faces > 0) line("faces of polyhedra", fmt::format("{} to {}", r.smallest_faces, r.largest_faces));
-    line("displacement of coarse over d", fmt::format("mean {}, largest {}", percent(r.coarse.mean), percent(r.coarse.largest)));
-    line("displacement of fines over d", fmt::format("mean {}, largest {}, {} above the limit", percent(r.fine.mean), percent(r.fine.largest), r.pushed_fines));
+    const auto moved = [&](const pack::Displacement& d) { return fmt::format("mean {}, median {}, largest {} ({} grains)", percent(d.mean), percent(d.median), percent(d.largest), d.grains); };
+    line("displacement of coarse over d", moved(r.coarse));
+    line("displacement of fines over d", fmt::format("{}, {} above the limit", moved(r.fine), r.pushed_fines));
+    line("  of those that carried load", moved(r.loaded_fine));
+    if (!r.strain.isZero()) line("strain of the box", fmt::format("{} {} {}", percent(r.strain.x()), percent(r.strain.y()), percent(r.strain.z())));
     line("fines in filled voids", r.trapped.empty() ? "none" : fmt::format("{}, {}: grains {}", r.trapped.size(), o.swap.drop_trapped ? "taken out" : "moved to the surface", fmt::join(r.trapped, " ")));
     const auto overlaps = [&](const char* name, const pack::Overlaps& v) {
         line(name, fmt::format("{} contacts, {} deeper than 1 % of d, largest {}", v.contacts, v.deep, percent(v.largest)));

@@ -47,9 +47,7 @@ void check_sound(const dem::World& world, const Box& box)
 {
     if (world.statistics().max_overlap > deepest_overlap) throw_deepest(world);
     const Eigen::Vector3d lower = box.lower(world), upper = box.upper(world);
-    for (int i = 0; i < world.body_count(); ++i)
-        if ((world.position(i).array() < lower.array()).any() || (world.position(i).array() > upper.array()).any())
-            throw Error("compression", "grain " + std::to_string(i) + " was pushed through a wall", "lower max_velocity or the pressure");
+    for (int i = 0; i < world.body_count(); ++i) check_inside(world, i, i, lower, upper, "compression", "lower max_velocity or the pressure");
 }
 
 double axis_pressure(const dem::World& world, const Box& box, int axis)
@@ -57,43 +55,11 @@ double axis_pressure(const dem::World& world, const Box& box, int axis)
     return 0.5 * (box.pressure(world, 2 * axis) + box.pressure(world, 2 * axis + 1));
 }
 
-/// Servo of one pair of walls: closing speed of each wall [m/s] from the missing pressure.
-/// The stiffness of the sample between the walls is that of its wall contacts in parallel, K_w, in series over n = gap/s layers with
-/// s = sqrt(A/contacts) the spacing of those contacts: K = K_w/n. The time constant is 2 sqrt(M/K): slower than the sample's own motion.
-double servo_speed(double missing, double area, double gap, int wall_contacts, double stiffness, double mass, double limit)
-{
-    const int contacts = std::max(wall_contacts, 1);
-    const double layers = std::max(gap / std::sqrt(area / contacts), 1.0);
-    const double k = contacts * stiffness / layers;
-    return std::clamp(missing * area / (2 * std::sqrt(k * mass)), -limit, limit);
-}
-
 double total_mass(const dem::World& world)
 {
     double sum = 0;
     for (int i = 0; i < world.body_count(); ++i) sum += world.mass(i);
     return sum;
-}
-
-void set_pair_speed(dem::World& world, const Box& box, int axis, double speed, bool both)
-{
-    const int low = box.first + 2 * axis, high = low + 1;
-    world.set_wall_velocity(low, both ? Eigen::Vector3d(speed * world.wall_normal(low)) : Eigen::Vector3d(Eigen::Vector3d::Zero()));
-    world.set_wall_velocity(high, speed * (both ? 1.0 : 2.0) * world.wall_normal(high));
-}
-
-void stop_walls(dem::World& world, const Box& box)
-{
-    for (int i = 0; i < 6; ++i) world.set_wall_velocity(box.first + i, Eigen::Vector3d::Zero());
-}
-
-/// Touching grains per wall of the box.
-std::array<int, 6> wall_contacts(const dem::World& world, const Box& box)
-{
-    std::array<int, 6> count{};
-    for (const dem::Contact& c : world.contacts())
-        if (const int wall = -1 - c.second - box.first; c.second < 0 && wall >= 0 && wall < 6) ++count[std::size_t(wall)];
-    return count;
 }
 
 double stiffest(const Spec& spec)
@@ -229,6 +195,49 @@ double Box::pressure(const dem::World& world, int i) const
 {
     const Eigen::Vector3d size = upper(world) - lower(world);
     return -world.wall_force(first + i).dot(world.wall_normal(first + i)) * size[i / 2] / size.prod();
+}
+
+// The stiffness of the sample between the walls is that of its wall contacts in parallel, K_w, in series over n = gap/s layers with
+// s = sqrt(A/contacts) the spacing of those contacts: K = K_w/n. The time constant is 2 sqrt(M/K): slower than the sample's own motion.
+double servo_speed(double missing, double area, double gap, int wall_contacts, double stiffness, double mass, double limit)
+{
+    const int contacts = std::max(wall_contacts, 1);
+    const double layers = std::max(gap / std::sqrt(area / contacts), 1.0);
+    const double k = contacts * stiffness / layers;
+    return std::clamp(missing * area / (2 * std::sqrt(k * mass)), -limit, limit);
+}
+
+void set_pair_speed(dem::World& world, const Box& box, int axis, double speed, bool both)
+{
+    const int low = box.first + 2 * axis, high = low + 1;
+    world.set_wall_velocity(low, both ? Eigen::Vector3d(speed * world.wall_normal(low)) : Eigen::Vector3d(Eigen::Vector3d::Zero()));
+    world.set_wall_velocity(high, speed * (both ? 1.0 : 2.0) * world.wall_normal(high));
+}
+
+void stop_walls(dem::World& world, const Box& box)
+{
+    for (int i = 0; i < 6; ++i) world.set_wall_velocity(box.first + i, Eigen::Vector3d::Zero());
+}
+
+std::array<int, 6> wall_contacts(const dem::World& world, const Box& box)
+{
+    std::array<int, 6> count{};
+    for (const dem::Contact& c : world.contacts())
+        if (const int wall = -1 - c.second - box.first; c.second < 0 && wall >= 0 && wall < 6) ++count[std::size_t(wall)];
+    return count;
+}
+
+void check_inside(const dem::World& world, int body, int grain, const Eigen::Vector3d& lower, const Eigen::Vector3d& upper, const char* phase, const char* help)
+{
+    const Eigen::Vector3d& x = world.position(body);
+    for (int axis = 0; axis < 3; ++axis) {
+        const bool below = !(x[axis] >= lower[axis]);
+        if (!below && x[axis] <= upper[axis]) continue;
+        const auto mm = [](double value) { return format_quantity(value, Dimension::length); };
+        throw Error(phase, "grain " + std::to_string(grain) + " (" + world.role(body) + ", " + mm(2 * world.equivalent_radius(body)) + ") left the box through the wall " + "xyz"[axis] + (below ? "-" : "+") +
+                               " at " + to_text(std::round(1e6 * world.time()) / 1e6) + " s: its centre is at (" + mm(x.x()) + ", " + mm(x.y()) + ", " + mm(x.z()) + ")",
+                    help);
+    }
 }
 
 std::string describe(const MotionWindow::Means& means)

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <numbers>
 #include <random>
 #include <sstream>
@@ -119,7 +120,8 @@ double highest_point(const dem::World& world)
 }
 
 /// Steps until the stop rule holds or the time is up. Returns whether it held.
-bool settle(dem::World& world, const Dropping& rule, double speed_limit, Keeper& keeper, LapClock& clock, const std::function<void(double, const MotionWindow::Means&)>& tell)
+bool settle(dem::World& world, const Dropping& rule, double speed_limit, Keeper& keeper, LapClock& clock, const std::function<void()>& check,
+            const std::function<void(double, const MotionWindow::Means&)>& tell)
 {
     constexpr int batch_of_steps = 100, decay_every = 10;
     const double dt = world.auto_time_step(), start = keeper.state.start;
@@ -133,6 +135,7 @@ bool settle(dem::World& world, const Dropping& rule, double speed_limit, Keeper&
             if (i % decay_every == 0) decay_velocities(world, rule.drag, decay_every * dt);
         }
         const MotionWindow::Means means = window.means(world);
+        check();
         tell(world.time() - start, means);
         if (means.contacts > 0 && means.unbalanced_ratio < rule.unbalanced_ratio && means.speed < speed_limit) return true;
     }
@@ -199,6 +202,13 @@ void pour(Grains& grains, const Spec& spec, std::uint64_t seed, Keeper& keeper)
     bool placed = keeper.resumes(Phase::pouring);
     if (placed) resume(world, sample, batches, random, keeper);
     const double limit = spec.dropping.speed_ratio * std::sqrt(spec.gravity.norm() * smallest);
+    std::vector<int> grain_of_body;
+    for (const Batch& batch : batches) grain_of_body.insert(grain_of_body.end(), batch.begin(), batch.end());
+    const auto check = [&] {
+        const Eigen::Vector3d upper(spec.size.x(), spec.size.y(), std::numeric_limits<double>::infinity());
+        for (int i = 0; i < world.body_count(); ++i)
+            check_inside(world, i, grain_of_body[std::size_t(i)], Eigen::Vector3d::Zero(), upper, "pouring", "raise [dropping] stiffness_factor or layers, or lower drop_height");
+    };
     Progress progress("pouring", double(batches.size()), keeper.state.batch);
     for (std::size_t b = std::size_t(keeper.state.batch); b < batches.size(); ++b) {
         if (!placed) {
@@ -209,18 +219,17 @@ void pour(Grains& grains, const Spec& spec, std::uint64_t seed, Keeper& keeper)
             keeper.state.random = as_text(random);
         }
         placed = false;
-        const bool settled = settle(world, spec.dropping, limit, keeper, clock, [&](double time, const MotionWindow::Means& means) {
+        const bool settled = settle(world, spec.dropping, limit, keeper, clock, check, [&](double time, const MotionWindow::Means& means) {
             progress.update(double(b) + std::min(time / spec.dropping.time_limit, 0.99), "layer " + std::to_string(b + 1) + " of " + std::to_string(batches.size()) + ", " + describe(means));
         });
         report.unsettled_layers += !settled;
     }
     progress.finish();
-    int body = 0;
-    for (const Batch& batch : batches)
-        for (const int i : batch) {
-            sample.particles[std::size_t(i)].position = world.position(body);
-            sample.particles[std::size_t(i)].orientation = world.orientation(body++);
-        }
+    for (std::size_t i = 0; i < grain_of_body.size(); ++i) {
+        Particle& p = sample.particles[std::size_t(grain_of_body[i])];
+        p.position = world.position(int(i));
+        p.orientation = world.orientation(int(i));
+    }
     sample.size = {spec.size.x(), spec.size.y(), highest_point(world)};
     report.layers = int(batches.size());
     report.steps += world.counters().steps;

@@ -22,11 +22,13 @@ struct SwapOptions {
     bool drop_trapped = false;      ///< fines whose centre a new coarse shape covers are taken out; else they are moved to its surface
     double limit = 0.1;             ///< refused: a coarse grain, or the mean of the fines, displaced by more of its diameter [-]
     double overlap_limit = 0.05;    ///< refused: an overlap that stays above this share of the smaller diameter [-]
-    int max_steps = 10000;          ///< of the damped run
+    bool restore_pressure = false;  ///< walls move until each pair has the pressure it had
+    int max_steps = 3000;           ///< of the damped run
 };
 
 struct Displacement {
-    double mean = 0, largest = 0;  ///< over the diameter of the grain [-]
+    double mean = 0, median = 0, largest = 0;  ///< over the diameter of the grain [-]
+    int grains = 0;
 };
 
 struct Overlaps {
@@ -42,6 +44,8 @@ struct SwapReport {
     int smallest_faces = 0, largest_faces = 0; ///< of the polyhedra made
     std::vector<int> trapped;                  ///< fines whose centre lay in a filled void: taken out, or moved to the surface
     Displacement coarse, fine;                 ///< by the relaxation; those moved out of filled voids are left out
+    Displacement loaded_fine;                  ///< of the fines that carried load before: two contacts or more, and more than their own weight
+    Eigen::Vector3d strain = Eigen::Vector3d::Zero();  ///< of the box by moving walls, positive when it becomes smaller [-]
     int pushed_fines = 0;                      ///< fines displaced by more than the limit
     Overlaps before, swapped, after;           ///< of the sample, right after the swap, at the end
     int springs_before = 0, springs_kept = 0;  ///< friction springs of the sample, and those that the new shapes took over
@@ -59,7 +63,7 @@ struct SwapReport {
 
 /// The same grains with other shapes, nothing relaxed: the shape frames stay where they are, so that the centre of mass of a grain
 /// moves by what separates the centroids of its old and its new shape. Spheres become shapes drawn evenly from the library, turned so
-/// that they meet their neighbours least, of 120 random orientations; others keep their orientation and become the shape of their own number. Friction springs of pairs whose kind of contact stays
+/// that they touch what they touched as deep as before, and overlap nothing else, of about 900 orientations each; others keep their orientation and become the shape of their own number. Friction springs of pairs whose kind of contact stays
 /// are kept: those of nodes go to the nearest new node.
 /// \throws UsageError  nothing to swap, or a shape that cannot be made from what there is
 /// \throws Error       a damaged library, a grain that harmonics cannot describe
@@ -67,9 +71,10 @@ Sample replace_shapes(const Sample& sample, const SwapOptions& options, std::uin
 
 /// replace_shapes(), then fines out of filled voids, then relaxation and measurement:
 /// 1. Overdamped: grains move by 0.2 of what would close a lone spring, at most a twentieth of their radius at a time; first fines
-///    alone with coarse grains held, then all, until no overlap is larger than the sample had (or 0.05 % of the diameter).
-/// 2. Damped run at the true parameters, drag 200 sqrt(g/d) with d the smallest diameter (loose fines sink at 0.005 sqrt(g d)),
-///    until the unbalanced ratio is below 0.05 and the kinetic energy below 1e-4 of the elastic, at most `max_steps` steps. Grains are left at rest.
+///    alone with coarse grains held, those still in the way turned anew, then all, until no overlap is larger than the sample had (or 0.05 % of
+///    the diameter).
+/// 2. Damped run at the true parameters, drag 200 sqrt(g/d) with d the smallest diameter, fines that carried nothing held up against gravity,
+///    with walls that restore the pressures if asked to, until the unbalanced ratio is below 0.05 and the kinetic energy below 1e-4 of the elastic, at most `max_steps` steps. Grains are left at rest.
 /// Nothing is relaxed when contact forces are those of before to 1e-9 of the largest.
 /// The same sample, options and seed give the same result for any number of threads.
 /// \param report  set anew

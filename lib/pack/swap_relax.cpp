@@ -14,8 +14,10 @@ namespace {
 
 constexpr double deep = 0.01;              ///< overlap / diameter that counts as deep
 constexpr double harmless_overlap = 1e-3;  ///< over the radius; what the sample had may be more
-constexpr int iterations_of_fines = 300, iterations_of_all = 300;
+constexpr int iterations_of_fines = 100, iterations_of_all = 300, rounds = 4;
 constexpr int steps_between_checks = 100;
+constexpr double fastest_wall = 0.02;  ///< [m/s]
+constexpr double pressure_tolerance = 0.05;
 
 std::string percent(double share) { return to_text(std::round(1000 * share) / 10) + " %"; }
 
@@ -90,41 +92,141 @@ void set_coarse(dem::World& world, const Sample& sample, dem::Motion motion)
         if (sample.particles[i].role == Role::coarse) world.set_motion(int(i), motion);
 }
 
-void settle(dem::World& world, const Sample& sample, const SwapOptions& options, SwapReport& report)
+/// Grains that touch something with more than their weight: they belong to the skeleton, others lie loose.
+std::vector<char> loaded_grains(const Sample& sample)
+{
+    std::vector<double> force(sample.particles.size(), 0);
+    std::vector<int> contacts(sample.particles.size(), 0);
+    for (const Contact& c : sample.contacts)
+        for (const int i : {c.first, c.second})
+            if (i >= 0) force[std::size_t(i)] += c.normal_force.norm(), ++contacts[std::size_t(i)];
+    std::vector<char> loaded;
+    for (std::size_t i = 0; i < force.size(); ++i)
+        loaded.push_back(contacts[i] > 1 && force[i] > 2 * mass(sample, sample.particles[i]) * sample.gravity.norm());
+    return loaded;
+}
+
+/// Fines out of overlaps while coarse grains are held: pushed, turned anew where pushing does not do, and so on.
+void free_fines(dem::World& world, Replaced& swapped, double allowed, SwapReport& report)
+{
+    Sample turned = swapped.sample;
+    std::vector<char> is_drawn(turned.particles.size(), 0);
+    for (const std::size_t i : swapped.drawn) is_drawn[i] = 1;
+    for (int round = 0;; ++round) {
+        report.iterations += world.relax(allowed, iterations_of_fines);
+        if (round == rounds || world.statistics().max_overlap <= allowed) return;
+        std::vector<char> deep_in(turned.particles.size(), 0);
+        for (const dem::Contact& c : world.contacts()) {
+            double r = world.equivalent_radius(c.first);
+            if (c.second >= 0) r = std::min(r, world.equivalent_radius(c.second));
+            if (c.overlap <= allowed * r) continue;
+            deep_in[std::size_t(c.first)] = 1;
+            if (c.second >= 0) deep_in[std::size_t(c.second)] = 1;
+        }
+        std::vector<std::size_t> again;
+        for (std::size_t i = 0; i < turned.particles.size(); ++i) {
+            turned.particles[i].position = world.position(int(i));
+            turned.particles[i].orientation = world.orientation(int(i));
+            if (deep_in[i] && is_drawn[i]) again.push_back(i);
+        }
+        if (again.empty()) return;
+        turn_to_fit(turned, again, swapped.random);
+        for (const std::size_t i : again) world.set_pose(int(i), turned.particles[i].position, turned.particles[i].orientation);
+    }
+}
+
+/// Walls close in or give way until each pair has the pressure it had.
+class WallServo {
+public:
+    WallServo(const dem::World& world, const Box& box, const Sample& before) : box_(box)
+    {
+        for (std::size_t w = 0; w < 6; ++w) pressure_[w] = before.walls[w].pressure;
+        for (int i = 0; i < world.body_count(); ++i) mass_ += world.mass(i);
+        for (const Material& m : before.materials) stiffness_ = std::max(stiffness_, m.normal_stiffness);
+    }
+
+    /// Sets the speeds; returns the largest relative error of a pressure.
+    double serve(dem::World& world)
+    {
+        const Eigen::Vector3d size = box_.upper(world) - box_.lower(world);
+        const auto contacts = wall_contacts(world, box_);
+        double worst = 0, mean = 0;
+        for (const double p : pressure_) mean += p / 6;
+        for (int axis = 0; axis < 3; ++axis) {
+            const std::size_t low = 2 * std::size_t(axis), high = low + 1;
+            const bool both = axis < 2;  // the bottom also carries the weight
+            const double wanted = both ? 0.5 * (pressure_[low] + pressure_[high]) : pressure_[high];
+            const double now = both ? 0.5 * (box_.pressure(world, int(low)) + box_.pressure(world, int(high))) : box_.pressure(world, int(high));
+            worst = std::max(worst, std::abs(wanted - now) / std::max(wanted, 0.1 * mean));
+            const double speed = servo_speed(wanted - now, size.prod() / size[axis], size[axis], std::min(contacts[low], contacts[high]), stiffness_, mass_, fastest_wall);
+            set_pair_speed(world, box_, axis, speed, both);
+        }
+        return worst;
+    }
+
+private:
+    Box box_;
+    std::array<double, 6> pressure_{};
+    double mass_ = 0, stiffness_ = 0;
+};
+
+void settle(dem::World& world, const Sample& sample, const Sample& before, const Box& box, const std::vector<char>& loaded, const SwapOptions& options, SwapReport& report)
 {
     const double dt = world.auto_time_step();
     double smallest = 1e300;
     for (const Particle& p : sample.particles) smallest = std::min(smallest, equivalent_diameter(sample, p));
     const double drag = 200 * std::sqrt(std::max(sample.gravity.norm(), 1.0) / smallest);
+    // what lay loose would only fall into the gaps that angular shapes leave under it: it is held up until the next tool sets it free
+    for (std::size_t i = 0; i < loaded.size(); ++i)
+        if (!loaded[i] && sample.particles[i].role == Role::fine) world.set_external_force(int(i), -world.mass(int(i)) * world.gravity(), Eigen::Vector3d::Zero());
+    WallServo servo(world, box, before);
     Progress progress("relaxing", options.max_steps);
+    double worst = 0;
     while (!report.relaxed && report.steps < options.max_steps) {
+        if (options.restore_pressure) worst = servo.serve(world);
         for (int i = 0; i < steps_between_checks; ++i) {
             world.step(dt);
             if (i % 10 == 9) decay_velocities(world, drag, 10 * dt);
         }
         report.steps += steps_between_checks;
         const Balance b = balance(world);
-        report.relaxed = b.unbalanced_ratio < 0.05 && b.kinetic_ratio < 1e-4;
+        report.relaxed = b.unbalanced_ratio < 0.05 && b.kinetic_ratio < 1e-4 && worst < pressure_tolerance;
         progress.update(double(report.steps), "unbalanced ratio " + to_text(std::round(1e4 * b.unbalanced_ratio) / 1e4));
     }
+    stop_walls(world, box);
+    world.clear_external_forces();
     progress.finish();
 }
 
-void measure_displacements(const dem::World& world, const Sample& sample, const std::vector<char>& moved_out, double limit, SwapReport& report)
+Displacement displacement(std::vector<double> ways)
 {
-    double coarse = 0, fines = 0;
+    Displacement d;
+    if (ways.empty()) return d;
+    std::sort(ways.begin(), ways.end());
+    for (const double way : ways) d.mean += way / double(ways.size());
+    d.median = ways[ways.size() / 2];
+    d.largest = ways.back();
+    d.grains = int(ways.size());
+    return d;
+}
+
+void measure_displacements(const dem::World& world, const Sample& sample, const std::vector<char>& moved_out, const std::vector<char>& loaded, double limit, SwapReport& report)
+{
+    std::vector<double> coarse, fines, carrying;
     for (std::size_t i = 0; i < sample.particles.size(); ++i) {
         if (moved_out[i]) continue;
-        const bool fine = sample.particles[i].role == Role::fine;
         const double way = (world.position(int(i)) - sample.particles[i].position).norm() / equivalent_diameter(sample, sample.particles[i]);
-        Displacement& d = fine ? report.fine : report.coarse;
-        d.mean += way;
-        d.largest = std::max(d.largest, way);
-        (fine ? fines : coarse) += 1;
-        report.pushed_fines += fine && way > limit;
+        if (sample.particles[i].role == Role::coarse) {
+            coarse.push_back(way);
+            continue;
+        }
+        fines.push_back(way);
+        if (loaded[i]) carrying.push_back(way);
+        report.pushed_fines += way > limit;
     }
-    if (coarse > 0) report.coarse.mean /= coarse;
-    if (fines > 0) report.fine.mean /= fines;
+    report.coarse = displacement(std::move(coarse));
+    report.fine = displacement(std::move(fines));
+    report.loaded_fine = displacement(std::move(carrying));
 }
 
 /// Refuses what would burst the sample, or is no longer the same sample.
@@ -140,20 +242,20 @@ void check(const dem::World& world, const Box& box, const SwapOptions& options, 
     if (report.fine.mean > options.limit)
         throw Error("swap", "fine grains moved by " + percent(report.fine.mean) + " of their diameter on average (--limit is " + percent(options.limit) + ")", help);
     const Eigen::Vector3d lower = box.lower(world), upper = box.upper(world);
-    for (int i = 0; i < world.body_count(); ++i)
-        if (!((world.position(i).array() > lower.array()).all() && (world.position(i).array() < upper.array()).all()))
-            throw Error("swap", "grain " + std::to_string(i) + " was pushed through a wall", help);
+    for (int i = 0; i < world.body_count(); ++i) check_inside(world, i, i, lower, upper, "swap", help.c_str());
 }
 
 }  // namespace
 
-void relax_swapped(Sample& sample, const Sample& before, const std::vector<char>& moved_out, const SwapOptions& options, SwapReport& report)
+void relax_swapped(Replaced& swapped, const Sample& before, const std::vector<char>& moved_out, const SwapOptions& options, SwapReport& report)
 {
+    Sample& sample = swapped.sample;
     report.pressure_before = before.statistics.mean_pressure;
     SampleIds ids;
     dem::World old = world_of(before, ids), world = world_of(sample, ids);
     evaluate(old);
     evaluate(world);
+    const Box box{ids.walls.front()};
     const double allowed = std::max(2 * old.statistics().max_overlap, harmless_overlap);
     report.before = overlaps(old);
     report.swapped = overlaps(world);
@@ -166,18 +268,19 @@ void relax_swapped(Sample& sample, const Sample& before, const std::vector<char>
         report.kinetic_energy = before.statistics.kinetic_energy;
         return;
     }
+    const std::vector<char> loaded = loaded_grains(before);
     set_coarse(world, sample, dem::Motion::fixed);
-    report.iterations = world.relax(allowed, iterations_of_fines);
+    free_fines(world, swapped, allowed, report);
     set_coarse(world, sample, dem::Motion::free);
     report.iterations += world.relax(allowed, iterations_of_all);
-    settle(world, sample, options, report);
+    settle(world, sample, before, box, loaded, options, report);
 
     const Balance b = balance(world);
     report.unbalanced_ratio = b.unbalanced_ratio;
     report.kinetic_energy = world.statistics().kinetic_energy;
     report.after = overlaps(world);
-    measure_displacements(world, sample, moved_out, options.limit, report);
-    const Box box{ids.walls.front()};
+    measure_displacements(world, sample, moved_out, loaded, options.limit, report);
+    report.strain = (before.size - (box.upper(world) - box.lower(world))).cwiseQuotient(before.size);
     check(world, box, options, report);
     if (!report.relaxed)
         report.warnings.push_back("the damped run ended after " + std::to_string(report.steps) + " steps with an unbalanced ratio of " +

@@ -1,6 +1,7 @@
 #pragma once
 /// \file pack/detail/phases.h
 /// The phases of a packing (pack/pack.h), one function each.
+#include <array>
 #include <string>
 #include <vector>
 
@@ -57,6 +58,18 @@ struct Box {
     /// Mean normal pressure of the bodies on wall i (0..5) [Pa].
     double pressure(const dem::World& world, int i) const;
 };
+
+/// \throws Error  when the centre of a body is outside the box: which grain, where and when
+void check_inside(const dem::World& world, int body, int grain, const Eigen::Vector3d& lower, const Eigen::Vector3d& upper, const char* phase, const char* help);
+
+/// Touching grains per wall of the box.
+std::array<int, 6> wall_contacts(const dem::World& world, const Box& box);
+/// Servo of one pair of walls: closing speed of each wall [m/s] from the missing pressure [Pa].
+/// \param gap  between the walls [m]; \param wall_contacts  on one of them; \param stiffness  of a contact [N/m]; \param mass  of the sample [kg]
+double servo_speed(double missing, double area, double gap, int wall_contacts, double stiffness, double mass, double limit);
+/// Both walls of a pair close at this speed each, or the upper one alone at twice it [m/s].
+void set_pair_speed(dem::World& world, const Box& box, int axis, double speed, bool both);
+void stop_walls(dem::World& world, const Box& box);
 
 /// Pours the grains: sets pose of every particle, and the smooth walls of the sample with the top one above the highest grain.
 void pour(Grains& grains, const Spec& spec, std::uint64_t seed, Keeper& keeper);

@@ -3,12 +3,12 @@
 /// New templates for a swap (pack/swap.h), and the relaxation after it.
 #include <cstdint>
 #include <filesystem>
-#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "pack/detail/random.h"
 #include "pack/sample.h"
 #include "pack/swap.h"
 
@@ -53,11 +53,27 @@ NewShape harmonic_shape(const Stone& stone, double volume, int degree, double re
 /// farthest outside is taken in until the hull has as many corners as faces allow.
 NewShape polyhedral_shape(const Stone& stone, double volume, int faces, int nodes);
 
-/// Turns grains whose orientation is free: of 60 random ones, twice over, each takes the one in which its corners lie least in its
-/// neighbours and theirs in it (sum of squared depths).
-void turn_to_fit(Sample& sample, const std::vector<std::size_t>& grains, const std::function<Eigen::Quaterniond()>& random_turn);
+/// Turns grains whose orientation is free, one after the other and several times over: of random turns, then of smaller and smaller ones from the best,
+/// each takes the one in which it touches what it touched (the contacts of the sample) as deep as before and overlaps nothing else.
+void turn_to_fit(Sample& sample, const std::vector<std::size_t>& grains, Random& random);
 
-/// Relaxes the new sample, whose grains stand where `replaced` has them; measures it. `moved_out` lies beside the particles.
-void relax_swapped(Sample& sample, const Sample& before, const std::vector<char>& moved_out, const SwapOptions& options, SwapReport& report);
+/// Whether two templates are the same body to contact, node for node.
+bool same_template(const ShapeTemplate& a, const ShapeTemplate& b);
+
+/// Springs of the old sample that mean the same between the new shapes.
+/// \param origin  of the new frame of each grain in the old one, at the old scale [m]
+/// \param is_new  whether a grain has a new shape
+void keep_springs(const Sample& old, const std::vector<Eigen::Vector3d>& origin, const std::vector<char>& is_new, Sample& sample, SwapReport& report);
+
+/// A sample with new shapes, nothing relaxed; its contacts are still those of the old shapes.
+struct Replaced {
+    Sample sample;
+    std::vector<std::size_t> drawn;  ///< grains that were spheres: their orientation is free
+    Random random;
+};
+Replaced replace(const Sample& sample, const SwapOptions& options, std::uint64_t seed, SwapReport& report);
+
+/// Relaxes the new sample and measures it. `before` has the same grains; `moved_out` lies beside them.
+void relax_swapped(Replaced& swapped, const Sample& before, const std::vector<char>& moved_out, const SwapOptions& options, SwapReport& report);
 
 }  // namespace coral::pack::detail
