@@ -1,6 +1,8 @@
 #include "pack/pack.h"
 
+#include "core/error.h"
 #include "core/text.h"
+#include "core/units.h"
 #include "pack/criteria.h"
 #include "pack/detail/keeper.h"
 #include "pack/detail/phases.h"
@@ -33,6 +35,20 @@ void collect_warnings(const Spec& spec, PackReport& report)
         report.warnings.push_back("relative density " + to_text(100 * report.relative_density) + " %: the void ratio lies outside [density] e_min and e_max");
 }
 
+/// Refuses a step that the compression would refuse after all of the pouring.
+void check_step(const Spec& spec, const Sample& sample)
+{
+    if (spec.dem_step <= 0 || spec.force_step) return;
+    dem::World world;
+    add_sample(world, sample);
+    constexpr double highest = 1.5;  // of the critical steps; World::step refuses more
+    const double critical = world.critical_time_step();
+    if (spec.dem_step > highest * critical)
+        throw UsageError(spec.step_location, "key 'time.dem_step': " + format_quantity(spec.dem_step, Dimension::time) + " is above 1.5 of the critical step, " +
+                                                 format_quantity(critical, Dimension::time) + " of the lightest grain",
+                         "write \"auto\" (" + format_quantity(world.auto_time_step(), Dimension::time) + "), or force_step = true beside it");
+}
+
 /// All phases from where the keeper stands.
 Sample pack(const Spec& spec, std::uint64_t seed, detail::Keeper& keeper)
 {
@@ -42,12 +58,14 @@ Sample pack(const Spec& spec, std::uint64_t seed, detail::Keeper& keeper)
         const detail::LapClock clock(report.loading_seconds);
         return make_grains(spec, seed, [&] { keeper.visit(); });
     }();
+    check_step(spec, grains.sample);
     if (!keeper.skips(Phase::pouring)) detail::pour(grains, spec, seed, keeper);
 
     Sample& sample = grains.sample;
     sample.walls = box_walls(sample.size);
     dem::WorldOptions options;
     options.gravity = spec.gravity;
+    options.force_step = spec.force_step;
     dem::World world(options);
     const SampleIds ids = add_sample(world, sample);
     const detail::Box box{ids.walls.front()};

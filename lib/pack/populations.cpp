@@ -193,6 +193,20 @@ void check_room(const Spec& spec, const Grains& grains)
     }
 }
 
+/// Whether there is solid, and none of it at the outermost nodes.
+bool surface_is_closed(const sdf::DistanceGrid& g)
+{
+    bool solid = false;
+    for (int k = 0; k < g.size.z(); ++k)
+        for (int j = 0; j < g.size.y(); ++j)
+            for (int i = 0; i < g.size.x(); ++i) {
+                if (!(g.distance[g.index(i, j, k)] <= 0)) continue;
+                solid = true;
+                if (i == 0 || j == 0 || k == 0 || i + 1 == g.size.x() || j + 1 == g.size.y() || k + 1 == g.size.z()) return false;
+            }
+    return solid;
+}
+
 ShapeTemplate polyhedron_template(const Corners& corners, int nodes)
 {
     const dem::Polyhedron body(corners.points, corners.name);
@@ -230,11 +244,18 @@ ShapeTemplate superellipsoid_template(const Population& p, double reach)
 
 ShapeTemplate load_shape(const Population& p, std::int64_t id, double reach)
 {
+    const auto closed = [&](const sdf::DistanceGrid& grid, const char* what) {
+        if (!surface_is_closed(grid))
+            throw UsageError(p.location, std::string("grain ") + std::to_string(id) + " of " + p.file.filename().string() + " has no closed surface: " + what,
+                             "leave it out of grains, or make the file again with csct2ls");
+    };
     ShapeTemplate shape;
     shape.kind = p.shape;
     shape.name = p.file.filename().string() + (p.shape == ShapeKind::sh ? " shape " : " grain_") + std::to_string(id);
     if (p.shape == ShapeKind::level_set) {
         sdf::GrainLevelSet grain = sdf::GrainReader(p.file).read(int(id));
+        closed(grain.solid, "its level set is solid at the border of its lattice, or nowhere");
+        closed(grain.apparent, "its filled level set is solid at the border of its lattice, or nowhere");
         shape.grid = std::make_shared<sdf::DistanceGrid>(sdf::extended(grain.solid, reach));
         shape.apparent_grid = std::make_shared<sdf::DistanceGrid>(std::move(grain.apparent));
         shape.volume = grain.volume;

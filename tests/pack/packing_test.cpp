@@ -129,6 +129,62 @@ TEST(Populations, name_the_place_of_a_grain_that_the_file_does_not_have)
     }
 }
 
+// A level set that is solid up to the border of its lattice has no surface there to touch.
+TEST(Populations, refuse_a_grain_without_a_closed_surface)
+{
+    coral::sdf::GrainLevelSet grain = hollow_capsule(1, 1.5e-3, 1e-3, 0.8e-3, 3e-4);
+    coral::sdf::DistanceGrid& g = grain.solid;
+    const int cut = g.size.z() / 2;  // the upper half goes
+    g.distance.resize(std::size_t(g.size.x()) * std::size_t(g.size.y()) * std::size_t(cut));
+    g.size.z() = cut;
+    coral::sdf::write_grains(scratch("open.vdb"), std::vector{grain}, {});
+    const Spec spec = spec_of("[box]\nsize = [0.02, 0.02, 0.02]\n[[population]]\nrole = \"coarse\"\nshape = \"level-set\"\nfile = \"open.vdb\"\ncount = 2\n");
+    try {
+        make_grains(spec, 1);
+        FAIL() << "the surface of the grain is open";
+    } catch (const coral::UsageError& error) {
+        EXPECT_NE(std::string(error.what()).find("spec.toml:6:1: grain 1 of open.vdb has no closed surface"), std::string::npos) << error.what();
+    }
+}
+
+namespace {
+
+std::string failure_of(const std::string& text)
+{
+    PackReport report;
+    try {
+        packed(text, 1, report);
+    } catch (const coral::Error& error) {
+        return error.what();
+    }
+    return "no error";
+}
+
+}  // namespace
+
+// The lightest of the spheres weighs 7.2 mg: its critical step is sqrt(m/(2 kn)) = 13.4 us.
+TEST(Packing, refuses_a_step_above_the_critical_one_unless_forced)
+{
+    const std::string message = failure_of(spheres + "[time]\ndem_step = \"50us\"\n");
+    EXPECT_NE(message.find("spec.toml:14:1: key 'time.dem_step': 50 us is above 1.5 of the critical step, 13.4579 us of the lightest grain"), std::string::npos) << message;
+    EXPECT_NE(message.find("force_step = true"), std::string::npos) << message;
+    Spec spec = spec_of(spheres + "[time]\ndem_step = \"25us\"\nforce_step = true\n");
+    spec.dropping.time_limit = 1e-3;
+    spec.compression.target = CompressionTarget::none;
+    spec.compression.relaxation_limit = 1e-3;
+    PackReport report;
+    EXPECT_NO_THROW(pack(spec, 1, report));
+}
+
+// Contacts ten million times too soft hold nothing: the first grain through the floor stops the packing.
+TEST(Packing, stops_at_a_grain_that_left_the_box_and_names_it)
+{
+    const std::string message = failure_of(spheres + "[dropping]\nstiffness_factor = 1e-7\n");
+    EXPECT_NE(message.find("pouring: grain "), std::string::npos) << message;
+    EXPECT_NE(message.find("left the box through the wall z- at "), std::string::npos) << message;
+    EXPECT_NE(message.find("(coarse, "), std::string::npos) << message;
+}
+
 // A tetrahedron with three edges a along the axes has a^3/6, an ellipsoid 4/3 pi a b c.
 TEST(Populations, draw_polyhedra_and_superellipsoids)
 {
