@@ -86,11 +86,13 @@ bool World::Impl::press_on_walls(std::size_t k, double dt, GeneralForce& out, Lo
 {
     SphereGridList& l = sphere_grids;
     const std::size_t i = std::size_t(l.sphere[k]), j = std::size_t(l.grid[k]);
-    const Shape& body = *shapes[std::size_t(shape[j])];
     const Vec3 offset = periodic(x[i] - x[j]);
     const Vec3 local = q[j].conjugate() * offset / scale[j];
-    // The surface lies within a spacing of where the distances say, whatever ridges they have between it and here.
-    if (l.touch[k] == 0 && scale[j] * (body.distance_grid().sample(local) - body.distance_grid().spacing) > radius[i]) return false;
+    // Triangles that were farther away when the list was made than the sphere has come since are not looked at.
+    const double reach = radius[i] / scale[j] + (local - l.listed[k]).norm();
+    Index end = l.facet_start[k];
+    while (end < l.facet_start[k + 1] && double(l.facet[std::size_t(end)].clearance) < reach) ++end;
+    if (l.touch[k] == 0 && end == l.facet_start[k]) return false;
 
     const detail::Facets& surface = *facets[std::size_t(shape[j])];
     const PairLaw& pair = law(material[i], material[j]);
@@ -100,8 +102,8 @@ bool World::Impl::press_on_walls(std::size_t k, double dt, GeneralForce& out, Lo
     PressMemory now;
     Vec3 push = Vec3::Zero();
     detail::Press press;
-    for (Index f = l.facet_start[k]; f < l.facet_start[k + 1]; ++f) {
-        if (!surface.press(l.facet[std::size_t(f)], local, radius[i] / scale[j], press)) continue;
+    for (Index f = l.facet_start[k]; f < end; ++f) {
+        if (!surface.press(l.facet[std::size_t(f)].triangle, local, radius[i] / scale[j], press)) continue;
         places.add(press);
         push += stiffness * press.force;
         now.stored += stiffness * scale[j] * press.energy;

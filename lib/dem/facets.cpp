@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <numeric>
 
 #include "sdf/mesh.h"
@@ -13,28 +14,32 @@ namespace {
 
 constexpr int cells_per_block = 4;
 
-/// Integrals over the part of a plane figure that lies in the disc of squared radius a2 about the origin, gathered edge by edge
-/// (Green): area, polar moment, and first moment.
+/// Integrals over the part of a triangle that lies in the disc of squared radius a2 about the origin of its plane, gathered edge by edge
+/// (Green): area, polar moment, and first moment. Angles of the arcs are multiplied up as complex numbers, so that one arc tangent serves.
 struct DiscPart {
-    double a2, area = 0.0, polar = 0.0;
-    Eigen::Vector3d first = Eigen::Vector3d::Zero();
+    double a2, area = 0.0, polar = 0.0, first_x = 0.0, first_y = 0.0;
+    double turn_re = 1.0, turn_im = 0.0;
+    bool arcs = false, inside = true;  ///< some arc may be in the triangle; the whole disc is
 
-    /// Sector of the disc between two points of a line at the distance e.
     void arc(double e, double from, double to)
     {
-        const double angle = std::atan2(e * (to - from), e * e + from * to);
-        area += 0.5 * a2 * angle;
-        polar += 0.25 * a2 * a2 * angle;
+        const double re = e * e + from * to, im = e * (to - from), t = turn_re * re - turn_im * im;
+        turn_im = turn_re * im + turn_im * re;
+        turn_re = t;
+        arcs = true;
     }
 
-    /// Edge on the line at the distance e (positive: the origin lies on the inner side) along `outward`, from t1 to t2 > t1.
-    void edge(double e, double t1, double t2, const Eigen::Vector3d& outward)
+    /// From (px, py) to (qx, qy), the triangle on the left.
+    void edge(double px, double py, double qx, double qy)
     {
-        const double half2 = a2 - e * e;
+        const double dx = qx - px, dy = qy - py, inverse = 1.0 / std::sqrt(dx * dx + dy * dy), ux = dx * inverse, uy = dy * inverse;
+        const double e = px * uy - py * ux, t1 = px * ux + py * uy, t2 = qx * ux + qy * uy, half2 = a2 - e * e;
         if (half2 <= 0.0) {
+            inside = inside && e > 0.0;
             arc(e, t1, t2);
             return;
         }
+        inside = false;
         double low = t1, high = t2;
         if (t1 * t1 > half2 || t2 * t2 > half2) {
             const double half = std::sqrt(half2);
@@ -43,10 +48,23 @@ struct DiscPart {
             if (low > t1) arc(e, t1, low);
             if (high < t2) arc(e, high, t2);
         }
-        const double length = high - low, cube = (high * high * high - low * low * low) / 3.0;
+        const double length = high - low, cube = (high * high * high - low * low * low) * (1.0 / 3.0);
+        const double push = 0.5 * (cube - half2 * length);
         area += 0.5 * e * length;
         polar += 0.25 * e * (e * e * length + cube);
-        first += (0.5 * (cube - half2 * length)) * outward;
+        first_x += push * uy;
+        first_y -= push * ux;
+    }
+
+    void close()
+    {
+        if (!arcs) return;
+        double angle = std::atan2(turn_im, turn_re);
+        // Between 0 and 2 pi; rounding must not make one of the other.
+        if (inside) angle = 2.0 * std::numbers::pi;
+        else if (angle < -1e-6) angle += 2.0 * std::numbers::pi;
+        area += 0.5 * a2 * angle;
+        polar += 0.25 * a2 * a2 * angle;
     }
 };
 
@@ -95,23 +113,33 @@ std::size_t Facets::memory() const
     return balls_.size() * (sizeof(Ball) + sizeof(Corners)) + start_.size() * sizeof(std::int32_t);
 }
 
-void Facets::gather(const Eigen::Vector3d& point, double distance, std::vector<std::int32_t>& list) const
+void Facets::gather(const Eigen::Vector3d& point, double distance, std::vector<Near>& list) const
 {
     // A triangle belongs to the block of its centroid and reaches at most a cell's diagonal beyond it.
     const double wide = distance + 2.0 * edge_ / cells_per_block;
-    const Eigen::Vector3i low = ((point - origin_).array() - wide).unaryExpr([&](double v) { return std::floor(v / edge_); }).cast<int>().max(0);
-    const Eigen::Vector3i high =
-        ((point - origin_).array() + wide).unaryExpr([&](double v) { return std::floor(v / edge_); }).cast<int>().min(blocks_.array() - 1);
+    const auto block = [&](const Eigen::Array3d& p) { return Eigen::Vector3i((p / edge_).floor().cast<int>()); };
+    const Eigen::Vector3i low = block((point - origin_).array() - wide).cwiseMax(0), high = block((point - origin_).array() + wide).cwiseMin((blocks_.array() - 1).matrix());
+    if (low.x() > high.x()) return;
+    const std::size_t begin = list.size();
     for (int k = low.z(); k <= high.z(); ++k)
         for (int j = low.y(); j <= high.y(); ++j) {
-            if (low.x() > high.x()) return;
             const std::size_t row = std::size_t(blocks_.x()) * (std::size_t(j) + std::size_t(blocks_.y()) * std::size_t(k));
-            for (std::int32_t t = start_[row + std::size_t(low.x())]; t < start_[row + std::size_t(high.x()) + 1]; ++t) {
-                const Ball& b = balls_[std::size_t(t)];
-                const double reach = distance + double(b.radius);
-                if ((point - Eigen::Vector3d(b.x, b.y, b.z)).squaredNorm() < reach * reach) list.push_back(t);
-            }
+            for (std::int32_t t = start_[row + std::size_t(low.x())]; t < start_[row + std::size_t(high.x()) + 1]; ++t)
+                if (const double d = clearance(t, point); d < distance) list.push_back({t, float(d)});
         }
+    std::sort(list.begin() + std::ptrdiff_t(begin), list.end(),
+              [](const Near& a, const Near& b) { return a.clearance < b.clearance || (a.clearance == b.clearance && a.triangle < b.triangle); });
+}
+
+/// Lower bound of the distance: to the part of the plane within the ball around the triangle.
+double Facets::clearance(std::int32_t triangle, const Eigen::Vector3d& point) const
+{
+    const Ball& ball = balls_[std::size_t(triangle)];
+    const float* at = corners_[std::size_t(triangle)].at;
+    const Eigen::Vector3d a(at[0], at[1], at[2]), b(at[3], at[4], at[5]), c(at[6], at[7], at[8]);
+    const double height = (b - a).cross(c - a).normalized().dot(a - point), away2 = (Eigen::Vector3d(ball.x, ball.y, ball.z) - point).squaredNorm();
+    const double beside = std::sqrt(std::max(away2 - height * height, 0.0)) - double(ball.radius);
+    return (1.0 - 1e-6) * std::hypot(height, std::max(beside, 0.0));  // rounding stays on the safe side
 }
 
 bool Facets::press(std::int32_t triangle, const Eigen::Vector3d& centre, double radius, Press& press) const
@@ -134,15 +162,19 @@ bool Facets::press(std::int32_t triangle, const Eigen::Vector3d& centre, double 
     DiscPart part{radius * radius - height * height};
     const double disc = std::sqrt(part.a2) + double(ball.radius);
     if (away2 - height * height >= disc * disc) return false;
-    const Eigen::Vector3d normal(scale * nx, scale * ny, scale * nz), u(ux, uy, uz), v(vx, vy, vz), p(px, py, pz);
-    const Eigen::Vector3d corner[3] = {p, p + u, p + v}, side[3] = {u, v - u, -v};
-    for (int c = 0; c < 3; ++c) {
-        const double length = side[c].norm();
-        const Eigen::Vector3d along = side[c] / length, outward = along.cross(normal);
-        const double t1 = along.dot(corner[c]);
-        part.edge(outward.dot(corner[c]), t1, t1 + length, outward);
-    }
-    press.force = (height * part.area * normal + part.first) / -radius;
+    // In the plane: x along the first side, from the foot of the centre.
+    const double along = 1.0 / std::sqrt(ux * ux + uy * uy + uz * uz), ex = ux * along, ey = uy * along, ez = uz * along;
+    const double mx = scale * nx, my = scale * ny, mz = scale * nz;
+    const double fx = my * ez - mz * ey, fy = mz * ex - mx * ez, fz = mx * ey - my * ex;
+    const double ax = px * ex + py * ey + pz * ez, ay = px * fx + py * fy + pz * fz, bx2 = ax + 1.0 / along;
+    const double cx2 = ax + vx * ex + vy * ey + vz * ez, cy2 = ay + vx * fx + vy * fy + vz * fz;
+    part.edge(ax, ay, bx2, ay);
+    part.edge(bx2, ay, cx2, cy2);
+    part.edge(cx2, cy2, ax, ay);
+    part.close();
+    const double up = height * part.area, share = -1.0 / radius;
+    press.force = {share * (up * mx + part.first_x * ex + part.first_y * fx), share * (up * my + part.first_x * ey + part.first_y * fy),
+                   share * (up * mz + part.first_x * ez + part.first_y * fz)};
     press.energy = 0.5 * (part.a2 * part.area - part.polar) / radius;
     return part.area > 0.0 && press.energy > 0.0;
 }

@@ -115,6 +115,7 @@ void make_sphere_grid_list(World::Impl& world, const std::vector<BroadPair>& pai
         l.slots.push_back(same ? old.slots[k] : Slots{});
         l.press.push_back(same ? old.press[k] : PressMemory{});
         if (!all_walls) continue;
+        l.listed.push_back(local / scale);
         if (shape.kind() == ShapeKind::grid) world.facets_of(world.shape[j]).gather(local / scale, within / scale, l.facet);
         l.facet_start.push_back(Index(l.facet.size()));
     }

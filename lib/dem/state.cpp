@@ -8,7 +8,7 @@ namespace coral::dem {
 
 namespace {
 
-constexpr std::uint64_t magic = 0x3430'4d45'4452'4f43;  // "CORDEM04"
+constexpr std::uint64_t magic = 0x3530'4d45'4452'4f43;  // "CORDEM05"
 constexpr std::uint64_t magic_name = 0x0000'ffff'ffff'ffff;  // the part without the version
 
 std::uint64_t checksum(std::span<const std::uint8_t> bytes)
@@ -77,7 +77,7 @@ void visit_state(World::Impl& m, Archive& io)
     SphereWallList& w = m.sphere_walls;
     io(w.body), io(w.wall), io(w.feature), io(w.touch), io(w.memory), io(w.out);
     SphereGridList& g = m.sphere_grids;
-    io(g.sphere), io(g.grid), io(g.touch), io(g.slots), io(g.press), io(g.facet_start), io(g.facet), io(g.out);
+    io(g.sphere), io(g.grid), io(g.touch), io(g.slots), io(g.press), io(g.listed), io(g.facet_start), io(g.facet), io(g.out);
     NodeList& n = m.nodes;
     io(n.slave), io(n.master), io(n.start), io(n.share), io(n.node), io(n.clearance), io(n.least), io(n.owed), io(n.first), io(n.count), io(n.out);
     io(n.skin), io(n.x_listed), io(n.q_listed), io(n.wall_listed), io(n.drift), io(n.wall_drift);

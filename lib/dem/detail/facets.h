@@ -27,12 +27,18 @@ public:
     std::size_t size() const { return balls_.size(); }
     std::size_t memory() const;  ///< [bytes]
 
-    /// Appends, in order, the triangles that come within `distance` of a point.
-    void gather(const Eigen::Vector3d& point, double distance, std::vector<std::int32_t>& list) const;
+    /// A triangle and how far it is at least from a point.
+    struct Near {
+        std::int32_t triangle;
+        float clearance;  ///< [m]
+    };
+    /// Appends the triangles that come within `distance` of a point, nearest first.
+    void gather(const Eigen::Vector3d& point, double distance, std::vector<Near>& list) const;
     /// What a ball presses on one triangle. \returns whether it covers any of it
     bool press(std::int32_t triangle, const Eigen::Vector3d& centre, double radius, Press& press) const;
 
 private:
+    double clearance(std::int32_t triangle, const Eigen::Vector3d& point) const;
     struct Ball {  ///< around a triangle
         float x, y, z, radius;
     };

@@ -134,7 +134,10 @@ struct SphereGridList {
     std::vector<std::uint8_t> touch;
     std::vector<Slots> slots;
     std::vector<PressMemory> press;
-    std::vector<Index> facet_start, facet;  ///< triangles within the skin, where all walls push; facet_start has one more entry
+    // Where all walls push:
+    std::vector<Vec3> listed;                 ///< centre of the sphere when the list was made, frame and scale of the shape [m]
+    std::vector<Index> facet_start;           ///< has one more entry
+    std::vector<detail::Facets::Near> facet;  ///< triangles within the skin, nearest first
     std::vector<GeneralForce> out;
 };
 
