@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <numbers>
+
 #include <numeric>
 
 #include "core/error.h"
@@ -54,6 +57,25 @@ TEST(SurfaceNodes, integrate_over_the_surface)
     }
     EXPECT_LE(closed.norm() / sum(nodes.areas), 3e-3);
     EXPECT_NEAR(volume / sphere_volume(1), 1.0, 5e-3);
+}
+
+TEST(SurfaceNodes, are_denser_where_a_ball_touches_and_still_integrate)
+{
+    // A ball with a closed round void: a probe larger than the void cannot touch its wall.
+    const double outer = 1.0, inner = 0.45;
+    const DistanceGrid grid = tabulated(shell(Eigen::Vector3d::Zero(), outer, inner), Eigen::Vector3d::Constant(-1.39), Eigen::Vector3i::Constant(57), 0.05);
+    const SurfaceNodes even = surface_nodes(grid, 1500), nodes = surface_nodes(grid, 1500, 0.7);
+    const auto inside = [](const SurfaceNodes& n) {
+        return std::count_if(n.positions.begin(), n.positions.end(), [](const Eigen::Vector3d& p) { return p.norm() < 0.7; });
+    };
+    const double share = inner * inner / (inner * inner + outer * outer);
+    EXPECT_NEAR(double(inside(even)), 1500 * share, 15);
+    EXPECT_NEAR(double(inside(nodes)), 1500 * share / 9 / (share / 9 + 1 - share), 8) << "a ninth of the density";
+    EXPECT_NEAR(sum(nodes.areas) / sum(even.areas), 1.0, 1e-12);
+    double outside = 0;
+    for (std::size_t n = 0; n < nodes.areas.size(); ++n)
+        if (nodes.positions[n].norm() > 0.7) outside += nodes.areas[n];
+    EXPECT_NEAR(outside / (4 * std::numbers::pi), 1.0, 2e-3);
 }
 
 TEST(SurfaceNodes, cover_both_sides_of_a_thin_wall)
