@@ -11,13 +11,16 @@
 #include "core/text.h"
 #include "pack-sample/psd_figure.h"
 #include "pack/pack.h"
+#include "pack/picture.h"
 
 using namespace coral;
 
 namespace {
 
+constexpr int picture_pixels = 1400;
+
 struct Options {
-    std::filesystem::path input, output, grains, psd_figure;
+    std::filesystem::path input, output, grains, psd_figure, figure;
     double scale = 1, checkpoint_every = 300;
     bool resume = false;
 };
@@ -29,6 +32,7 @@ void declare(cli::Options& options, Options& o)
     options.add("--grains", o.grains, "Level-set grains, .vdb, in place of the files that the specification names").existing_file();
     options.add("--scale", o.scale, "Factor on the lengths of shapes that keep the size of their file [-]");
     options.add("--psd-figure", o.psd_figure, "Picture of the gradation, .png or .svg (needs gnuplot)");
+    options.add("--figure", o.figure, "Picture of the sample, cut open, .png");
     options.flag("--resume", o.resume, "Go on from <output>.checkpoint, which a stopped or killed run leaves");
     options.quantity("--checkpoint-every", o.checkpoint_every, Dimension::time, "Wall time between checkpoints");
 }
@@ -138,6 +142,7 @@ void run(const Options& o, const cli::Context& context, std::uint64_t seed)
     if (!std::filesystem::is_directory(o.output.has_parent_path() ? o.output.parent_path() : "."))
         throw UsageError(o.output.string(), "its folder does not exist", "make the folder first");
     if (!o.psd_figure.empty()) tool::check_psd_figure(o.psd_figure);
+    if (!o.figure.empty()) pack::check_png(o.figure);
     if (o.checkpoint_every < 0) throw UsageError("--checkpoint-every", "is negative", "take a time such as 300s");
     const std::filesystem::path checkpoint = o.output.string() + ".checkpoint";
     pack::PackReport report;
@@ -149,7 +154,7 @@ void run(const Options& o, const cli::Context& context, std::uint64_t seed)
     RecordEntry entry = context.record;
     for (const char* option : {"resume", "checkpoint-every"}) entry.options.erase(option);
     if (!o.grains.empty()) entry.options["grains"] = o.grains.filename().string();  // no folders in a history
-    entry.options.erase("psd-figure");  // makes no difference to the sample
+    for (const char* option : {"psd-figure", "figure"}) entry.options.erase(option);  // make no difference to the sample
     entry.options["specification"] = read_text_file(o.input);  // a file name alone would not repeat the run
     if (std::isfinite(report.relative_density)) entry.options["relative_density"] = coral::to_text(report.relative_density);
     sample.history.push_back(std::move(entry));
@@ -157,6 +162,7 @@ void run(const Options& o, const cli::Context& context, std::uint64_t seed)
     std::error_code ignored;
     std::filesystem::remove(checkpoint, ignored);
     if (!o.psd_figure.empty()) tool::draw_psd(sample, o.psd_figure);
+    if (!o.figure.empty()) pack::write_png(pack::draw_sample(sample, picture_pixels), o.figure);
     for (const std::string& warning : report.warnings) spdlog::warn("{}", warning);
     cli::print_summary(context, to_json(sample, report), to_text(sample, report, o.output));
 }

@@ -6,14 +6,17 @@
 
 #include "cli.h"
 #include "core/error.h"
+#include "pack/picture.h"
 #include "pack/swap.h"
 
 using namespace coral;
 
 namespace {
 
+constexpr int picture_pixels = 1400;
+
 struct Options {
-    std::filesystem::path input, output;
+    std::filesystem::path input, output, figure;
     std::string coarse = "keep", fine = "keep", keep = "volume";
     pack::SwapOptions swap;
 };
@@ -33,6 +36,7 @@ void declare(cli::Options& options, Options& o)
     options.flag("--drop-trapped", o.swap.drop_trapped, "Take out fines that a filled void covers; else they are moved to its surface");
     options.add("--limit", o.swap.limit, "Largest displacement of a coarse grain, and mean one of the fines, over the diameter").not_negative();
     options.add("--overlap-limit", o.swap.overlap_limit, "Largest overlap that may stay, over the smaller diameter").not_negative();
+    options.add("--figure", o.figure, "Picture of the sample, cut open, .png");
     options.flag("--restore-pressure", o.swap.restore_pressure, "Move the walls until each pair has the pressure it had");
     options.add("--steps", o.swap.max_steps, "Longest damped run [steps]").between(0, 10000000);
 }
@@ -114,6 +118,7 @@ void run(Options& o, const cli::Context& context, std::uint64_t seed)
     if (!std::filesystem::exists(o.input)) throw UsageError(o.input.string(), "does not exist", "make it with pack-sample");
     if (!std::filesystem::is_directory(o.output.has_parent_path() ? o.output.parent_path() : "."))
         throw UsageError(o.output.string(), "its folder does not exist", "make the folder first");
+    if (!o.figure.empty()) pack::check_png(o.figure);
     o.swap.coarse = kind_of(o.coarse);
     o.swap.fine = kind_of(o.fine);
     o.swap.keep_mass = o.keep == "mass";
@@ -122,8 +127,10 @@ void run(Options& o, const cli::Context& context, std::uint64_t seed)
     pack::Sample sample = pack::swap_shapes(before, o.swap, seed, report);
     RecordEntry entry = context.record;
     if (!o.swap.library.empty()) entry.options["library"] = o.swap.library.filename().string();  // no folders in a history
+    entry.options.erase("figure");  // makes no difference to the sample
     sample.history.push_back(std::move(entry));
     pack::write_sample(sample, o.output);
+    if (!o.figure.empty()) pack::write_png(pack::draw_sample(sample, picture_pixels), o.figure);
     for (const std::string& warning : report.warnings) spdlog::warn("{}", warning);
     cli::print_summary(context, to_json(sample, report, o), to_text(sample, report, o));
 }

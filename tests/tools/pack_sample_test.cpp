@@ -38,13 +38,15 @@ TEST(PackSample, draws_the_gradation_and_tells_the_relative_density)
 {
     const ScratchFolder folder;
     write_text(folder.path() / "spec.toml", spec + "[density]\ne_min = 0.4\ne_max = 1.2\n");
-    const ProgramResult result = run_program("pack-sample spec.toml -o sample.h5 --psd-figure psd.png --seed 3", folder.path());
+    const ProgramResult result = run_program("pack-sample spec.toml -o sample.h5 --psd-figure psd.png --figure cut.png --seed 3", folder.path());
     EXPECT_EQ(result.exit_code, 0) << result.err;
     EXPECT_GT(std::filesystem::file_size(folder.path() / "psd.png"), 1000u);
+    EXPECT_GT(std::filesystem::file_size(folder.path() / "cut.png"), 10000u);
     EXPECT_NE(result.out.find("relative density"), std::string::npos) << result.out;
-    EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 3);  // nothing is left behind
+    EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 4);  // nothing is left behind
     EXPECT_EQ(run_program("pack-sample spec.toml -o sample.h5 --psd-figure psd.gif", folder.path()).exit_code, 2);
-    EXPECT_EQ(read_text_file(folder.path() / "sample.h5").find("psd.png"), std::string::npos);  // a picture does not change the sample
+    EXPECT_EQ(run_program("pack-sample spec.toml -o sample.h5 --figure cut.gif", folder.path()).exit_code, 2);
+    EXPECT_EQ(read_text_file(folder.path() / "sample.h5").find("cut.png"), std::string::npos);  // a picture does not change the sample
 }
 
 /// Packs in a process of its own and sends a signal after a while.
