@@ -55,12 +55,13 @@ struct Kind {
     std::shared_ptr<const Shape> shape;
     double scale;
 };
-std::vector<Kind> kinds()
+const std::vector<Kind>& kinds()
 {
-    return {{"sphere", Shape::sphere(), 2e-3},
+    static const std::vector<Kind> all{{"sphere", Shape::sphere(), 2e-3},
             {"level set", grid_ellipsoid({1.3e-3, 1e-3, 0.8e-3}, 0.1e-3, 1500, 1.5e-3), 1},
             {"polyhedron", polyhedron_shape(stone(26, 4), 1500), 1},
             {"superellipsoid", superellipsoid_shape({Vec3(1.2e-3, 1e-3, 0.8e-3), 0.7, 0.8}, 1.5e-3, "superellipsoid", 1500, 0.1e-3), 1}};
+    return all;
 }
 
 /// Distance along a line at which the overlap of two bodies of a world is reached.
@@ -81,7 +82,7 @@ double place_at(World& world, const Vec3& way, const Quat& turn, double overlap)
 TEST(EveryPair, forces_turn_with_the_bodies)
 {
     std::mt19937_64 random(3);
-    const std::vector<Kind> all = kinds();
+    const std::vector<Kind>& all = kinds();
     for (const SphereScheme scheme : {SphereScheme::nearest, SphereScheme::walls})
         for (std::size_t a = 0; a < all.size(); ++a)
             for (std::size_t b = a; b < all.size(); ++b)
@@ -111,7 +112,7 @@ TEST(EveryPair, forces_turn_with_the_bodies)
 
 TEST(EveryPair, bounces_across_the_periodic_seam_as_inside)
 {
-    const std::vector<Kind> all = kinds();
+    const std::vector<Kind>& all = kinds();
     for (std::size_t a = 0; a < all.size(); ++a)
         for (std::size_t b = a; b < all.size(); ++b) {
             Vec3 v[2], w[2];
@@ -135,7 +136,7 @@ TEST(EveryPair, bounces_across_the_periodic_seam_as_inside)
 
 TEST(EveryPair, half_overlapping_insertion_is_relaxed_without_speed)
 {
-    const std::vector<Kind> all = kinds();
+    const std::vector<Kind>& all = kinds();
     for (const SphereScheme scheme : {SphereScheme::nearest, SphereScheme::walls})
         for (std::size_t a = 0; a < all.size(); ++a)
             for (std::size_t b = a; b < all.size(); ++b) {
@@ -152,7 +153,7 @@ TEST(EveryPair, half_overlapping_insertion_is_relaxed_without_speed)
 
 TEST(EveryPair, tangent_coincident_and_flat_gradients_give_finite_forces)
 {
-    const std::vector<Kind> all = kinds();
+    const std::vector<Kind>& all = kinds();
     for (const SphereScheme scheme : {SphereScheme::nearest, SphereScheme::walls})
         for (std::size_t a = 0; a < all.size(); ++a)
             for (std::size_t b = a; b < all.size(); ++b) {
