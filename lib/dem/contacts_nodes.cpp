@@ -20,11 +20,11 @@ struct Field {
     double scale = 1.0;
 
     /// Distance [m] and world gradient at a world point.
-    double operator()(const Vec3& p, Vec3& gradient) const
+    double operator()(const Vec3& p, Vec3& gradient, detail::CellMemory& memory) const
     {
         if (!wall) {
             Vec3 local;
-            const double d = scale * body.depth_and_gradient(rotation.transpose() * (p - centre) / scale, local);
+            const double d = scale * body.depth_and_gradient(rotation.transpose() * (p - centre) / scale, local, memory);
             gradient = rotation * local;
             return d;
         }
@@ -125,7 +125,8 @@ public:
             NodeContact c;
             c.node = node;
             c.arm = rotation * surface.nodes()[std::size_t(node)];
-            c.depth = -field_(world_.x[a_] + c.arm, c.gradient);
+            if (held) c.cell = past->cell;
+            c.depth = -field_(world_.x[a_] + c.arm, c.gradient, c.cell);
             c.stiffness = stiffness_ * surface.node_areas()[std::size_t(node)];
             if (c.depth <= 0.0) {
                 if (held) release(*past, 0.0, Vec3::Zero(), s), ++past;
@@ -288,7 +289,7 @@ void World::Impl::node_loop(double dt)
         for (std::size_t p = first; p < last; ++p) {
             s.tests += l.start[p + 1] - l.start[p];
             // What was farther away when it was listed than both sides have come since is not looked at.
-            const double near = 1.25 * (l.drift_of(l.slave[p]) + l.drift_of(l.master[p]));
+            const double near = steepest * (l.drift_of(l.slave[p]) + l.drift_of(l.master[p]));
             const Index from = Index(fresh.size());
             if (l.count[p] > 0 || double(l.least[p]) <= near) {
                 NodePair pair(*this, p, dt);
@@ -367,7 +368,7 @@ void World::Impl::compute_contacts(double dt)
     dissipated_damping += sums.damping;
     counters.contacts += sums.touching;
     counters.pair_tests += std::int64_t(spheres.other.size() + sphere_walls.body.size() + sphere_grids.sphere.size() + nodes.slave.size());
-    counters.node_tests += std::int64_t(sphere_grids.sphere.size()) + sums.node_queries;
+    counters.node_tests += sums.node_queries;
     counters.seconds_pairs += seconds_since(start);
 }
 
@@ -377,8 +378,10 @@ void World::Impl::refresh_forces()
     if (forces_valid) return;
     const double before = sums.elastic_normal + sums.elastic_tangential;
     const double friction = dissipated_friction;
-    // Whoever moved the bodies: every listed node is looked at.
+    // Whoever moved the bodies: everything listed is looked at.
     std::fill(nodes.drift.begin(), nodes.drift.end(), free_path * nodes.skin);
+    std::fill(moved2.begin(), moved2.end(), free_path * skin * free_path * skin);
+    std::fill(grid_drift.begin(), grid_drift.end(), free_path * skin);
     w_before = w;
     v_end = v;
     compute_contacts(0.0);

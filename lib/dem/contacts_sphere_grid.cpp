@@ -168,7 +168,7 @@ bool World::Impl::press_on_nearest(std::size_t k, double dt, GeneralForce& out, 
     const detail::DistanceField field(*shapes[std::size_t(shape[j])]);
     const Vec3 offset = periodic(x[i] - x[j]);
     Vec3 local_gradient;
-    const double overlap = radius[i] - scale[j] * field.distance_and_gradient(q[j].conjugate() * offset / scale[j], local_gradient);
+    const double overlap = radius[i] - scale[j] * field.distance_and_gradient(q[j].conjugate() * offset / scale[j], local_gradient, l.press[k].cell);
     const bool touching = overlap > 0.0;
     if (!touching && l.touch[k] == 0) return false;
     const PairLaw& pair = law(material[i], material[j]);
@@ -177,6 +177,7 @@ bool World::Impl::press_on_nearest(std::size_t k, double dt, GeneralForce& out, 
     const Vec3 n = q[j] * local_normal;
     const double root_mass = std::sqrt(1.0 / (inverse_mass[i] + inverse_mass[j]));
     PressMemory now;
+    now.cell = l.press[k].cell;
     Slots& slots = l.slots[k];
     out = {};
     out.a = Index(i);
@@ -259,6 +260,11 @@ void World::Impl::sphere_grid_loop(double dt)
         GeneralForce* const begin = l.out.data() + first;
         GeneralForce* out = begin;
         for (std::size_t k = first; k < last; ++k) {
+            if (l.touch[k] == 0) {
+                const double room = double(l.clearance[k]) - steepest * grid_drift[std::size_t(l.grid[k])];
+                if (room > 0.0 && room * room > steepest * steepest * moved2[std::size_t(l.sphere[k])]) continue;
+            }
+            ++s.node_queries;
             const bool on_grid = shapes[std::size_t(shape[std::size_t(l.grid[k])])]->kind() == ShapeKind::grid;
             if (all_walls && on_grid ? press_on_walls(k, dt, *out, s, crossing) : press_on_nearest(k, dt, *out, s, crossing)) ++out;
         }

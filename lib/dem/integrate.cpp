@@ -52,7 +52,11 @@ Quat free_rotation(const Quat& principal_to_world, const Vec3& momentum, const V
 
 }  // namespace
 
-double World::Impl::critical_step() const { return least_period(false); }
+double World::Impl::critical_step() const
+{
+    if (known_critical_step < 0.0) known_critical_step = least_period(false);
+    return known_critical_step;
+}
 
 double World::Impl::automatic_step() const { return options.step_fraction * std::min(least_period(false), least_period(true)); }
 
@@ -146,15 +150,19 @@ World::Impl::Worn World::Impl::kick_and_drift(double dt)
             gravity_way += mass[i] * options.gravity.dot(way);
             if (any_external) external += external_force[i].dot(way) + dt * external_torque[i].dot(w[i]);
         }
-        const double moved2 = (x[i] - x_reference[i]).squaredNorm();
-        expired = expired || moved2 > limit2;
+        const double way2 = (x[i] - x_reference[i]).squaredNorm();
+        expired = expired || way2 > limit2;
+        moved2[i] = way2;
         if (!has_nodes[i]) {
             turn_sphere(q[i], dt * w[i]);
             continue;
         }
         w_before[i] = w[i];
         turn_grid(i, dt);
-        if (mixed) expired = expired || std::sqrt(moved2) + turn_between(q[i], q_reference[i]) * radius[i] > limit;
+        if (mixed) {
+            grid_drift[i] = std::sqrt(way2) + turn_between(q[i], q_reference[i]) * radius[i];
+            expired = expired || grid_drift[i] > limit;
+        }
         nodes.drift[i] = drift_since_listed(i);
         farthest = std::max(farthest, nodes.drift[i]);
     }

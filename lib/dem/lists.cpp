@@ -113,6 +113,9 @@ void make_sphere_grid_list(World::Impl& world, const std::vector<BroadPair>& pai
         const bool same = k < old.sphere.size() && key_of(old.sphere[k], old.grid[k]) == key;
         l.touch.push_back(same ? old.touch[k] : std::uint8_t{0});
         l.slots.push_back(same ? old.slots[k] : Slots{});
+        // A meshed surface lies within a spacing of where the distances say.
+        const double room = distance - world.radius[i] - (all_walls && field.grid ? scale * field.grid->spacing : 0.0);
+        l.clearance.push_back(std::nextafter(float(room), -1.0F));
         l.press.push_back(same ? old.press[k] : PressMemory{});
         if (!all_walls) continue;
         l.listed.push_back(local / scale);
@@ -153,6 +156,8 @@ void World::Impl::make_lists()
     make_blocks();
     x_reference = x;
     q_reference = q;
+    moved2.assign(x.size(), 0.0);
+    grid_drift.assign(x.size(), 0.0);
     for (WallData& wall : walls) wall.reference = wall.point;
     bool spheres_in = false, grids_in = false;
     for (std::size_t i = 0; i < x.size(); ++i)
@@ -183,10 +188,10 @@ bool World::Impl::lists_expired() const
     for (const WallData& wall : walls)
         if ((wall.point - wall.reference).squaredNorm() > limit * limit) return true;
     for (std::size_t i = 0; i < x.size(); ++i) {
-        const double moved2 = (x[i] - x_reference[i]).squaredNorm();
-        if (moved2 > limit * limit) return true;
+        const double way2 = (x[i] - x_reference[i]).squaredNorm();
+        if (way2 > limit * limit) return true;
         if (!mixed || !has_nodes[i]) continue;
-        if (std::sqrt(moved2) + turn_between(q[i], q_reference[i]) * radius[i] > limit) return true;
+        if (std::sqrt(way2) + turn_between(q[i], q_reference[i]) * radius[i] > limit) return true;
     }
     return false;
 }

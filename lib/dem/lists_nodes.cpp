@@ -10,9 +10,6 @@ namespace coral::dem {
 
 namespace {
 
-/// Lattices may rise a little faster than the way.
-constexpr double steepest = 1.25;
-
 struct Directed {
     Index slave, master;
     double share;

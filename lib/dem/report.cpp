@@ -204,6 +204,7 @@ void World::Impl::drop_contacts(Index body)
     for (std::size_t k = 0; k < sphere_grids.sphere.size(); ++k)
         if (sphere_grids.sphere[k] == body || sphere_grids.grid[k] == body) {
             sphere_grids.slots[k] = {};
+            sphere_grids.press[k] = {};
             sphere_grids.touch[k] = 0;
         }
     for (std::size_t p = 0; p < nodes.slave.size(); ++p)

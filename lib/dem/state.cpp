@@ -71,13 +71,13 @@ void visit_state(World::Impl& m, Archive& io)
     io(m.x), io(m.v), io(m.v_end), io(m.w), io(m.w_before), io(m.momentum), io(m.q), io(m.force), io(m.torque), io(m.external_force), io(m.external_torque), io(m.added_mass);
     io(m.scale), io(m.density), io(m.shape), io(m.material), io(m.motion), io(m.in);
     for (WallData& wall : m.walls) io(wall.point), io(wall.velocity), io(wall.force), io(wall.reference);
-    io(m.options.gravity), io(m.any_external), io(m.active), io(m.lists_valid), io(m.forces_valid), io(m.mixed), io(m.skin), io(m.x_reference), io(m.q_reference);
+    io(m.options.gravity), io(m.any_external), io(m.active), io(m.lists_valid), io(m.forces_valid), io(m.mixed), io(m.skin), io(m.x_reference), io(m.q_reference), io(m.moved2), io(m.grid_drift);
     SphereList& s = m.spheres;
     io(s.row), io(s.other), io(s.memory), io(s.touch), io(s.root_mass), io(s.out), io(s.rows);
     SphereWallList& w = m.sphere_walls;
     io(w.body), io(w.wall), io(w.feature), io(w.touch), io(w.memory), io(w.out);
     SphereGridList& g = m.sphere_grids;
-    io(g.sphere), io(g.grid), io(g.touch), io(g.slots), io(g.press), io(g.listed), io(g.facet_start), io(g.facet), io(g.out);
+    io(g.sphere), io(g.grid), io(g.touch), io(g.slots), io(g.clearance), io(g.press), io(g.listed), io(g.facet_start), io(g.facet), io(g.out);
     NodeList& n = m.nodes;
     io(n.slave), io(n.master), io(n.start), io(n.share), io(n.node), io(n.clearance), io(n.least), io(n.owed), io(n.first), io(n.count), io(n.out);
     io(n.skin), io(n.x_listed), io(n.q_listed), io(n.wall_listed), io(n.drift), io(n.wall_drift);

@@ -34,6 +34,7 @@ std::string World::Impl::name(std::size_t i) const { return "body " + std::to_st
 
 void World::Impl::update_laws()
 {
+    known_critical_step = -1.0;
     const std::size_t n = materials.size();
     const auto harmonic = [](double a, double b) { return a + b > 0.0 ? 2.0 * a * b / (a + b) : 0.0; };
     laws.assign(n * n, {});
@@ -50,6 +51,7 @@ void World::Impl::update_laws()
 
 void World::Impl::update_mass(std::size_t i)
 {
+    known_critical_step = -1.0;
     const Shape& s = *shapes[std::size_t(shape[i])];
     const double c = scale[i];
     has_nodes[i] = s.kind() != ShapeKind::sphere;
@@ -192,6 +194,7 @@ void World::remove_body(int body)
     m.wall_work -= m.kinetic_energy(i);
     m.in[i] = 0;
     m.inverse_mass[i] = m.inverse_inertia[i] = 0.0;
+    m.known_critical_step = -1.0;
     --m.active;
     m.lists_valid = m.forces_valid = false;
 }

@@ -128,11 +128,13 @@ struct PressMemory {
     Wrench push, pull, drag;  ///< elastic, of friction springs, of dashpots
     double stored = 0, stretched = 0;  ///< in the elastic contact and in the friction springs [J]
     double owed = 0.0;                 ///< error of the work that waits for correction [J]
+    detail::CellMemory cell;
 };
 struct SphereGridList {
     std::vector<Index> sphere, grid;
     std::vector<std::uint8_t> touch;
     std::vector<Slots> slots;
+    std::vector<float> clearance;  ///< distance - radius when the list was made, rounded down [m]
     std::vector<PressMemory> press;
     // Where all walls push:
     std::vector<Vec3> listed;                 ///< centre of the sphere when the list was made, frame and scale of the shape [m]
@@ -152,6 +154,7 @@ struct NodeContact {
     Vec3 spring = Vec3::Zero();
     Vec3 pull = Vec3::Zero();            ///< force of the spring
     Vec3 drag = Vec3::Zero();            ///< force of dashpots and of what holds them back: its work is dissipated
+    detail::CellMemory cell;
 };
 
 /// Nodes of `slave` that are near `master` (a grid, or wall -1 - master). Pairs are in order; a pair without near nodes is listed as well,
@@ -183,6 +186,8 @@ struct NodeList {
 /// Share of the skin that a body may move before the lists are made anew: below one half, for trilinear distances may rise
 /// a little faster than the way.
 constexpr double free_path = 0.4;
+/// Lattices may rise a little faster than the way: what was farther away than this times the way is not there yet.
+constexpr double steepest = 1.25;
 /// Skin of the lists of nodes / that of the spheres.
 constexpr double node_skin = 0.4;
 
@@ -227,6 +232,8 @@ struct World::Impl {
     double skin = 0;
     std::vector<Vec3> x_reference;
     std::vector<Quat> q_reference;
+    std::vector<double> moved2;      ///< squared way since the lists were made (or more) [m2]
+    std::vector<double> grid_drift;  ///< longest way of a point of a body with nodes, likewise [m]
     bool mixed = false;  ///< spheres and grids are both there
     SphereList spheres;
     SphereWallList sphere_walls;
@@ -302,6 +309,7 @@ struct World::Impl {
     double critical_step() const;
     double automatic_step() const;
     double least_period(bool flat) const;
+    mutable double known_critical_step = -1;  ///< negative: to be found anew
 };
 
 /// Broad phase: pairs a < b of active bodies with |x_a - x_b| < radius_a + radius_b + skin, ordered; pairs of bodies that both do not
