@@ -312,17 +312,32 @@ void World::Impl::node_loop(double dt)
     });
 }
 
+// Threads take ranges of bodies and read all contacts, so that every sum runs in the order of the contacts.
 void World::Impl::sum_forces()
 {
-    for (std::size_t i = 0; i < x.size(); ++i) {
+    const std::size_t parts = x.size() > body_grain ? std::size_t(thread_count()) : 1, share = (x.size() + parts - 1) / parts;
+    parallel_blocks(x.size(), std::max(share, std::size_t{1}), [&](std::size_t first, std::size_t last) { sum_forces(first, last); });
+}
+
+// Sums of the bodies first..last; walls belong to the first range.
+void World::Impl::sum_forces(std::size_t first, std::size_t last)
+{
+    for (std::size_t i = first; i < last; ++i) {
         force[i].setZero();
         torque[i].setZero();
     }
-    for (WallData& wall : walls) wall.force.setZero();
+    if (first == 0)
+        for (WallData& wall : walls) wall.force.setZero();
+    const auto ours = [=](Index i) { return std::size_t(i) - first < last - first; };
     const auto add_point = [&](const PointForce& c) {
+        const bool a = ours(c.a), b = c.b < 0 ? first == 0 : ours(c.b);
+        if (!a && !b) return;
         const Vec3 total = c.force * c.normal + c.tangential, moment = c.normal.cross(c.tangential);
-        force[std::size_t(c.a)] += total;
-        torque[std::size_t(c.a)] -= c.arm_a * moment;
+        if (a) {
+            force[std::size_t(c.a)] += total;
+            torque[std::size_t(c.a)] -= c.arm_a * moment;
+        }
+        if (!b) return;
         if (c.b < 0) {
             walls[std::size_t(-1 - c.b)].force -= total;
         } else {
@@ -332,11 +347,13 @@ void World::Impl::sum_forces()
     };
     const auto add_general = [&](const GeneralForce& c) {
         const Vec3 total = c.normal_force + c.tangential_force;
-        force[std::size_t(c.a)] += total;
-        torque[std::size_t(c.a)] += c.torque_a;
+        if (ours(c.a)) {
+            force[std::size_t(c.a)] += total;
+            torque[std::size_t(c.a)] += c.torque_a;
+        }
         if (c.b < 0) {
-            walls[std::size_t(-1 - c.b)].force -= total;
-        } else {
+            if (first == 0) walls[std::size_t(-1 - c.b)].force -= total;
+        } else if (ours(c.b)) {
             force[std::size_t(c.b)] -= total;
             torque[std::size_t(c.b)] += c.torque_b;
         }

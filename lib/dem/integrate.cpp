@@ -3,6 +3,7 @@
 #include <limits>
 
 #include "core/error.h"
+#include "core/parallel.h"
 #include "core/text.h"
 #include "dem/detail/impl.h"
 
@@ -90,11 +91,12 @@ void World::Impl::check_step(double dt) const
                     "use " + to_text(automatic_step()) + " s (automatic) or a smaller stiffness");
 }
 
-// Kick of one body over dt.
-inline void World::Impl::kick_body(std::size_t i, double dt, const Vec3& g_dt)
+// Kick of one body over dt. Returns the energy that its added mass takes up.
+inline double World::Impl::kick_body(std::size_t i, double dt, const Vec3& g_dt)
 {
+    double taken = 0.0;
     if (i < added_mass.size() && added_mass[i] != Vec3::Zero())
-        kick_with_added_mass(i, dt);
+        taken = kick_with_added_mass(i, dt);
     else if (any_external)
         v[i] += (inverse_mass[i] * dt) * (force[i] + external_force[i]) + g_dt;
     else
@@ -107,76 +109,88 @@ inline void World::Impl::kick_body(std::size_t i, double dt, const Vec3& g_dt)
     } else {
         w[i] += inverse_inertia[i] * impulse;
     }
+    return taken;
 }
 
 void World::Impl::kick(double dt)
 {
     const Vec3 g_dt = options.gravity * dt;
-    for (std::size_t i = 0; i < x.size(); ++i)
-        if (inverse_mass[i] > 0.0) kick_body(i, dt, g_dt);
+    external_work -= parallel_sum(x.size(), body_grain, 0.0, [&](std::size_t first, std::size_t last) {
+        double taken = 0.0;
+        for (std::size_t i = first; i < last; ++i)
+            if (inverse_mass[i] > 0.0) taken += kick_body(i, dt, g_dt);
+        return taken;
+    });
 }
 
 // (m + added) dv = dt (forces + m g), component by component. The energy that the added mass takes up counts as work done outside.
-void World::Impl::kick_with_added_mass(std::size_t i, double dt)
+double World::Impl::kick_with_added_mass(std::size_t i, double dt)
 {
     const Vec3 before = v[i];
     const Vec3 inertia = added_mass[i].array() + mass[i];
     v[i] += (dt * (force[i] + external_force[i] + mass[i] * options.gravity)).cwiseQuotient(inertia);
-    external_work -= 0.5 * added_mass[i].dot(v[i].cwiseAbs2() - before.cwiseAbs2());
+    return 0.5 * added_mass[i].dot(v[i].cwiseAbs2() - before.cwiseAbs2());
 }
 
 // First kick, way and turn of every body in one pass over memory; returns which lists are worn out.
 World::Impl::Worn World::Impl::kick_and_drift(double dt)
 {
+    Drift all = parallel_sum(x.size(), body_grain, Drift{}, [&](std::size_t first, std::size_t last) { return drift_bodies(first, last, dt); });
+    gravity_work += all.gravity_work;
+    external_work += all.external_work;
+    const double limit = free_path * skin;
+    for (std::size_t k = 0; k < walls.size(); ++k) {
+        WallData& wall = walls[k];
+        wall.point += dt * wall.velocity;
+        all.farthest = std::max(all.farthest, (wall.point - wall.reference).norm());
+        nodes.wall_drift[k] = (wall.point - nodes.wall_listed[k]).norm();
+        all.node_farthest = std::max(all.node_farthest, nodes.wall_drift[k]);
+    }
+    if (!std::isfinite(all.finite)) check_numbers();
+    return {all.farthest > limit, all.node_farthest > free_path * nodes.skin};
+}
+
+World::Impl::Drift World::Impl::drift_bodies(std::size_t first, std::size_t last, double dt)
+{
     const Vec3 half_g = 0.5 * dt * options.gravity;
-    const double limit = free_path * skin, limit2 = limit * limit;
-    double farthest = 0.0;
-    double finite = 0.0, gravity_way = 0.0, external = 0.0;
-    bool expired = false;
-    for (std::size_t i = 0; i < x.size(); ++i) {
+    Drift sum;
+    double farthest2 = 0.0;
+    for (std::size_t i = first; i < last; ++i) {
         if (!in[i]) continue;
         if (motion[i] != Motion::free) {
             v_end[i] = v[i];
             if (motion[i] == Motion::fixed) continue;
         } else {
             const Vec3 before = v[i];
-            kick_body(i, 0.5 * dt, half_g);
+            sum.external_work -= kick_body(i, 0.5 * dt, half_g);
             v_end[i] = 2.0 * v[i] - before;
         }
         const Vec3 way = dt * v[i];
         x[i] += way;
-        finite += v[i].squaredNorm() + w[i].squaredNorm();
-        if (motion[i] == Motion::free) {
-            gravity_way += mass[i] * options.gravity.dot(way);
-            if (any_external) external += external_force[i].dot(way) + dt * external_torque[i].dot(w[i]);
-        }
+        sum.finite += v[i].squaredNorm() + w[i].squaredNorm();
         const double way2 = (x[i] - x_reference[i]).squaredNorm();
-        expired = expired || way2 > limit2;
         moved2[i] = way2;
-        if (!has_nodes[i]) {
-            turn_sphere(q[i], dt * w[i]);
-            continue;
+        farthest2 = std::max(farthest2, way2);
+        Vec3 turn = dt * w[i];
+        if (has_nodes[i]) {
+            w_before[i] = w[i];
+            turn_grid(i, dt);
+            turn = 0.5 * (turn + dt * w[i]);
+            if (mixed) {
+                grid_drift[i] = std::sqrt(way2) + turn_between(q[i], q_reference[i]) * radius[i];
+                sum.farthest = std::max(sum.farthest, grid_drift[i]);
+            }
+            nodes.drift[i] = drift_since_listed(i);
+            sum.node_farthest = std::max(sum.node_farthest, nodes.drift[i]);
+        } else {
+            turn_sphere(q[i], turn);
         }
-        w_before[i] = w[i];
-        turn_grid(i, dt);
-        if (mixed) {
-            grid_drift[i] = std::sqrt(way2) + turn_between(q[i], q_reference[i]) * radius[i];
-            expired = expired || grid_drift[i] > limit;
-        }
-        nodes.drift[i] = drift_since_listed(i);
-        farthest = std::max(farthest, nodes.drift[i]);
+        if (motion[i] != Motion::free) continue;
+        sum.gravity_work += mass[i] * options.gravity.dot(way);
+        if (any_external) sum.external_work += external_force[i].dot(way) + external_torque[i].dot(turn);
     }
-    gravity_work += gravity_way;
-    external_work += external;
-    for (std::size_t k = 0; k < walls.size(); ++k) {
-        WallData& wall = walls[k];
-        wall.point += dt * wall.velocity;
-        expired = expired || (wall.point - wall.reference).squaredNorm() > limit2;
-        nodes.wall_drift[k] = (wall.point - nodes.wall_listed[k]).norm();
-        farthest = std::max(farthest, nodes.wall_drift[k]);
-    }
-    if (!std::isfinite(finite)) check_numbers();
-    return {expired, farthest > free_path * nodes.skin};
+    sum.farthest = std::max(sum.farthest, std::sqrt(farthest2));
+    return sum;
 }
 
 void World::Impl::turn_grid(std::size_t i, double dt)

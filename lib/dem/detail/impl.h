@@ -192,7 +192,7 @@ constexpr double steepest = 1.25;
 constexpr double node_skin = 0.4;
 
 // Large enough that a small world runs in one block, without threads.
-constexpr std::size_t row_grain = 1024, entry_grain = 2048, grid_grain = 512, node_grain = 16;
+constexpr std::size_t body_grain = 1024, row_grain = 1024, entry_grain = 2048, grid_grain = 512, node_grain = 16;
 
 /// Pair of the broad phase.
 struct BroadPair {
@@ -290,17 +290,30 @@ struct World::Impl {
     void close_books(std::size_t k, const PressMemory& now, bool clamped, double dt, GeneralForce& out, LoopSums& s, std::vector<Crossing>& crossing);
     void node_loop(double dt);
     void sum_forces();
+    void sum_forces(std::size_t first, std::size_t last);
     void refresh_forces();
 
     // integrate.cpp
     void check_step(double dt) const;
     void kick(double dt);
-    void kick_body(std::size_t i, double dt, const Vec3& g_dt);
-    void kick_with_added_mass(std::size_t i, double dt);
+    double kick_body(std::size_t i, double dt, const Vec3& g_dt);
+    double kick_with_added_mass(std::size_t i, double dt);
     struct Worn {
         bool lists, nodes;
     };
     Worn kick_and_drift(double dt);
+    /// What moving some bodies came to.
+    struct Drift {
+        double gravity_work = 0, external_work = 0;
+        double finite = 0;                       ///< no number when one of them is none
+        double farthest = 0, node_farthest = 0;  ///< ways since the lists were made [m]
+        Drift operator+(const Drift& o) const
+        {
+            return {gravity_work + o.gravity_work, external_work + o.external_work, finite + o.finite, std::max(farthest, o.farthest),
+                    std::max(node_farthest, o.node_farthest)};
+        }
+    };
+    Drift drift_bodies(std::size_t first, std::size_t last, double dt);
     void turn_grid(std::size_t i, double dt);
     void correct_crossings();
     void check_numbers() const;
