@@ -332,17 +332,16 @@ void World::Impl::sum_forces(std::size_t first, std::size_t last)
     const auto add_point = [&](const PointForce& c) {
         const bool a = ours(c.a), b = c.b < 0 ? first == 0 : ours(c.b);
         if (!a && !b) return;
-        const Vec3 total = c.force * c.normal + c.tangential, moment = c.normal.cross(c.tangential);
         if (a) {
-            force[std::size_t(c.a)] += total;
-            torque[std::size_t(c.a)] -= c.arm_a * moment;
+            force[std::size_t(c.a)] += c.total;
+            torque[std::size_t(c.a)] -= c.arm_a * c.moment;
         }
         if (!b) return;
         if (c.b < 0) {
-            walls[std::size_t(-1 - c.b)].force -= total;
+            walls[std::size_t(-1 - c.b)].force -= c.total;
         } else {
-            force[std::size_t(c.b)] -= total;
-            torque[std::size_t(c.b)] -= c.arm_b * moment;
+            force[std::size_t(c.b)] -= c.total;
+            torque[std::size_t(c.b)] -= c.arm_b * c.moment;
         }
     };
     const auto add_general = [&](const GeneralForce& c) {

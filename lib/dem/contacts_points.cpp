@@ -64,24 +64,44 @@ void take_memory(const Members& m, const std::vector<PointMemory>& memory, const
     g.touched = m.numbers([&](int k) { return touch[std::size_t(m.entry[k])] != 0 ? 1.0 : 0.0; });
 }
 
-/// Memory, sums and `out` of a group; `b_id` turns members into what PointForce calls b.
+/// Sums over the contacts of a block, lane by lane: added up at its end.
+struct LaneSums {
+    Lanes stored_normal = all(0.0), stored_tangential = all(0.0), friction = all(0.0), damping = all(0.0), depth = all(0.0), deep = all(0.0);
+    void add(const Members& m, const PointGroup& g, const PointResult& r, double cap)
+    {
+        const Lanes zero = all(0.0), one = all(1.0), there = Lanes{0.0, 1.0, 2.0, 3.0} < all(double(m.count)) ? one : zero;
+        stored_normal += there * r.stored_normal;
+        stored_tangential += there * r.stored_tangential;
+        friction += there * r.friction;
+        damping += there * r.damping;
+        const Lanes relative = g.overlap / g.smaller;
+        depth = detail::max(depth, there * relative);
+        deep += relative > all(cap) ? there : zero;
+    }
+    void add_to(LoopSums& s) const
+    {
+        const auto sum = [](Lanes l) { return (l[0] + l[1]) + (l[2] + l[3]); };
+        s.elastic_normal += sum(stored_normal);
+        s.elastic_tangential += sum(stored_tangential);
+        s.friction += sum(friction);
+        s.damping += sum(damping);
+        s.deep += std::int64_t(sum(deep));
+        for (int k = 0; k < lane_count; ++k) s.max_overlap = std::max(s.max_overlap, depth[k]);
+    }
+};
+
+/// Memory and `out` of a group; `b_id` turns members into what PointForce calls b.
 template <class Id>
-void put_back(const Members& m, const PointGroup& g, const PointResult& r, double cap, const Id& b_id, std::vector<PointMemory>& memory,
-              std::vector<std::uint8_t>& touch, PointForce*& out, LoopSums& s)
+void put_back(const Members& m, const PointGroup& g, const PointResult& r, const Id& b_id, std::vector<PointMemory>& memory,
+              std::vector<std::uint8_t>& touch, PointForce*& out)
 {
+    const detail::Vec3Lanes total = r.force * g.normal + r.tangential, moment = detail::cross(g.normal, r.tangential);
     for (int k = 0; k < m.count; ++k) {
         const std::size_t e = std::size_t(m.entry[k]);
         const Vec3 normal = detail::lane(g.normal, k);
         memory[e] = {detail::lane(r.spring, k), normal, detail::lane(r.drag, k), g.overlap[k]};
         touch[e] = r.force[k] > 0.0 ? 1 : 2;
-        *out++ = {m.a[k], b_id(m.b[k]), normal, detail::lane(r.tangential, k), r.force[k], g.overlap[k], r.arm_a[k], r.arm_b[k]};
-        s.elastic_normal += r.stored_normal[k];
-        s.elastic_tangential += r.stored_tangential[k];
-        s.friction += r.friction[k];
-        s.damping += r.damping[k];
-        const double depth = g.overlap[k] / g.smaller[k];
-        s.max_overlap = std::max(s.max_overlap, depth);
-        s.deep += depth > cap;
+        *out++ = {m.a[k], b_id(m.b[k]), m.entry[k], detail::lane(total, k), detail::lane(moment, k), r.force[k], g.overlap[k], r.arm_a[k], r.arm_b[k]};
     }
 }
 
@@ -114,6 +134,7 @@ void World::Impl::sphere_loop(double dt)
     parallel_blocks(l.rows.size(), row_grain, [&](std::size_t first, std::size_t last) {
         const std::size_t block = first / row_grain;
         LoopSums s;
+        LaneSums sums_of_lanes;
         std::vector<Crossing>& crossing = crossings[block];
         const Index from = l.row[first];
         PointForce* const begin = l.out.data() + from;
@@ -178,8 +199,10 @@ void World::Impl::sphere_loop(double dt)
                     detail::add_crossing(crossing, m.a[k], m.b[k], *m.law[k], g.radius_a[k] + g.radius_b[k] - past.norm(), g.overlap[k], g.approach[k],
                                          g.root_mass[k], dt, detail::lane(g.normal, k), Vec3::Zero(), s);
                 }
-            put_back(m, g, r, options.overlap_cap, [](Index b) { return b; }, l.memory, l.touch, out, s);
+            put_back(m, g, r, [](Index b) { return b; }, l.memory, l.touch, out);
+            sums_of_lanes.add(m, g, r, options.overlap_cap);
         }
+        sums_of_lanes.add_to(s);
         s.tests = l.row[last] - from;
         s.touching = out - begin;
         out_count[0][block] = std::int32_t(out - begin);
@@ -194,6 +217,7 @@ void World::Impl::sphere_wall_loop(double dt)
     parallel_blocks(l.body.size(), entry_grain, [&](std::size_t first, std::size_t last) {
         const std::size_t block = first / entry_grain;
         LoopSums s;
+        LaneSums sums_of_lanes;
         std::vector<Crossing>& crossing = crossings[base + block];
         PointForce* const begin = l.out.data() + first;
         PointForce* out = begin;
@@ -253,8 +277,10 @@ void World::Impl::sphere_wall_loop(double dt)
                     detail::add_crossing(crossing, m.a[k], -1 - m.b[k], *m.law[k], g.overlap[k] + dt * detail::lane(g.relative, k).dot(n), g.overlap[k],
                                          g.approach[k], g.root_mass[k], dt, n, Vec3::Zero(), s);
                 }
-            put_back(m, g, r, options.overlap_cap, [](Index b) { return -1 - b; }, l.memory, l.touch, out, s);
+            put_back(m, g, r, [](Index b) { return -1 - b; }, l.memory, l.touch, out);
+            sums_of_lanes.add(m, g, r, options.overlap_cap);
         }
+        sums_of_lanes.add_to(s);
         s.tests = std::int64_t(last - first);
         s.touching = out - begin;
         out_count[1][block] = std::int32_t(out - begin);

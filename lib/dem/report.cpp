@@ -12,7 +12,9 @@ namespace {
 
 Contact report(const World::Impl& m, const PointForce& c)
 {
-    return {c.a, c.b, m.x[std::size_t(c.a)] - c.arm_a * c.normal, c.normal, c.force * c.normal, c.tangential, c.overlap, 1};
+    const Vec3& normal = (c.b < 0 ? m.sphere_walls.memory : m.spheres.memory)[std::size_t(c.entry)].normal;
+    const Vec3 push = c.force * normal;
+    return {c.a, c.b, m.x[std::size_t(c.a)] - c.arm_a * normal, normal, push, c.total - push, c.overlap, 1};
 }
 
 Contact report(const World::Impl& m, const GeneralForce& c)

@@ -31,10 +31,11 @@ struct WallData {
 
 /// One-point contact of a sphere with a sphere or a wall, as the loops leave it for summation and reports.
 struct PointForce {
-    Index a = 0, b = 0;                                     ///< b < 0: wall -1 - b
-    Vec3 normal = Vec3::Zero(), tangential = Vec3::Zero();  ///< unit, from b to a; force on a
-    double force = 0, overlap = 0;                          ///< normal force; depth
-    double arm_a = 0, arm_b = 0;                            ///< distance of the contact point from the centres along the normal
+    Index a = 0, b = 0;                                 ///< b < 0: wall -1 - b
+    Index entry = 0;                                    ///< in its list, whose memory has the normal
+    Vec3 total = Vec3::Zero(), moment = Vec3::Zero();  ///< force on a; normal x tangential force
+    double force = 0, overlap = 0;                      ///< normal force; depth
+    double arm_a = 0, arm_b = 0;                        ///< distance of the contact point from the centres along the normal
 };
 
 /// What a one-point contact keeps from one step to the next.
