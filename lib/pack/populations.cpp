@@ -279,6 +279,7 @@ ShapeTemplate load_shape(const Population& p, std::int64_t id, double reach)
             sh::tabulate(surface, p.grid_spacing > 0 ? p.grid_spacing : shape.equivalent_diameter / 60, reach));
         shape.degree = surface.degree;
         shape.coefficients = surface.coefficients;
+        shape.centre = surface.centre;
     }
     sdf::SurfaceNodes nodes = sdf::surface_nodes(*shape.grid, p.surface_nodes);
     shape.nodes = std::move(nodes.positions);

@@ -44,6 +44,7 @@ struct ShapeTemplate {
     std::vector<Eigen::Vector3d> vertices;  ///< of a polyhedron, whose hull it is; shape frame [m]
     Eigen::Vector3d radii = Eigen::Vector3d::Zero();          ///< of a superellipsoid [m]
     Eigen::Vector2d exponents = Eigen::Vector2d::Ones();      ///< of a superellipsoid: e1, e2 of Barr
+    Eigen::Vector3d centre = Eigen::Vector3d::Zero();         ///< of the harmonics in the shape frame [m]
     std::vector<double> coefficients;    ///< (degree + 1)^2 real orthonormal coefficients of the radius [m], index l(l+1)+m
 };
 

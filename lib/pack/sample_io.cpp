@@ -99,6 +99,7 @@ void write_shape(H5File& file, const std::string& group, const ShapeTemplate& sh
     if (shape.kind != ShapeKind::sh) return;
     write_column(file, group + "/coefficients", shape.coefficients);
     file.set_attribute(group, "degree", std::int64_t(shape.degree));
+    file.set_attribute(group, "centre", std::span<const double>(shape.centre.data(), 3));
 }
 
 void write_particles(H5File& file, const std::vector<Particle>& particles)
@@ -251,6 +252,11 @@ ShapeTemplate read_shape(const Reader& in, const std::string& group)
     if (shape.kind != ShapeKind::sh) return shape;
     shape.degree = static_cast<int>(file.integer_attribute(group, "degree"));
     shape.coefficients = in.numbers(group + "/coefficients", std::size_t(shape.degree + 1) * std::size_t(shape.degree + 1));
+    if (file.has_attribute(group, "centre")) {  // samples of before lack it
+        const auto centre = file.numbers_attribute(group, "centre");
+        if (centre.size() != 3) in.fail(group, "attribute centre needs three numbers");
+        shape.centre = row3(centre, 0);
+    }
     return shape;
 }
 

@@ -89,6 +89,7 @@ Stone stone_of(const ShapeTemplate& shape)
     stone.id = id_of(shape.name).value_or(0);
     stone.degree = shape.degree;
     stone.coefficients = shape.coefficients;
+    stone.centre = shape.centre;
     stone.volume = shape.apparent_volume;
     stone.apparent = shape.apparent_grid ? shape.apparent_grid : shape.grid;
     stone.points = shape.kind == ShapeKind::polyhedron ? shape.vertices : shape.nodes;
@@ -153,6 +154,7 @@ NewShape harmonic_shape(const Stone& stone, double volume, int degree, double re
     shape.grid = std::make_shared<sdf::DistanceGrid>(sh::tabulate(centred, spacing, std::max(reach, 3 * spacing)));
     shape.degree = centred.degree;
     shape.coefficients = centred.coefficients;
+    shape.centre = centred.centre;
     sdf::SurfaceNodes surface_nodes = sdf::surface_nodes(*shape.grid, nodes);
     shape.nodes = std::move(surface_nodes.positions);
     shape.node_areas = std::move(surface_nodes.areas);

@@ -50,6 +50,7 @@ Sample awkward_sample()
         } else if (k == 2) {
             t.degree = 1;
             t.coefficients = {uniform(random), uniform(random), 0, uniform(random)};
+            t.centre = vector();
         } else if (k == 3) {
             t.grid = nullptr;
             for (int i = 0; i < 9; ++i) t.vertices.push_back(vector());
@@ -107,6 +108,7 @@ TEST(SampleFile, comes_back_bit_for_bit)
         EXPECT_EQ(t.shapes[k].nodes, s.shapes[k].nodes);
         EXPECT_EQ(t.shapes[k].node_areas, s.shapes[k].node_areas);
         EXPECT_EQ(t.shapes[k].coefficients, s.shapes[k].coefficients);
+        EXPECT_EQ(t.shapes[k].centre, s.shapes[k].centre);
         EXPECT_EQ(t.shapes[k].vertices, s.shapes[k].vertices);
         EXPECT_EQ(t.shapes[k].radii, s.shapes[k].radii);
         EXPECT_EQ(t.shapes[k].exponents, s.shapes[k].exponents);
