@@ -71,8 +71,8 @@ Sample replace_shapes(const Sample& sample, const SwapOptions& options, std::uin
 
 /// replace_shapes(), then fines out of filled voids, then relaxation and measurement:
 /// 1. Overdamped: grains move by 0.2 of what would close a lone spring, at most a twentieth of their radius at a time; first fines
-///    alone with coarse grains held, those still in the way turned anew, then all, until no overlap is larger than the sample had (or 0.05 % of
-///    the diameter).
+///    alone with coarse grains held, those still in the way turned anew, then all, until no overlap is larger than twice what the sample had,
+///    at least 0.05 % of the diameter.
 /// 2. Damped run at the true parameters, drag 200 sqrt(g/d) with d the smallest diameter, fines that carried nothing held up against gravity,
 ///    with walls that restore the pressures if asked to, until the unbalanced ratio is below 0.05 and the kinetic energy below 1e-4 of the elastic, at most `max_steps` steps. Grains are left at rest.
 /// Nothing is relaxed when contact forces are those of before to 1e-9 of the largest.
