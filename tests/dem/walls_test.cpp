@@ -34,6 +34,31 @@ TEST(WallPress, on_a_plane_it_is_the_linear_law)
     }
 }
 
+TEST(WallPress, scale_of_the_grid_changes_lengths_alone)
+{
+    // A ball of 2 mm tabulated at two sizes, one of them used at twice its scale: the same forces on a sphere in the same places.
+    Vec3 force[2], torque[2];
+    for (const bool scaled : {false, true}) {
+        WorldOptions o;
+        o.gravity.setZero();
+        o.sphere_scheme = SphereScheme::walls;
+        World world(o);
+        world.add_material({"default", 2780.0, 2e5, 1e5, 0.0, 0.0});
+        BodySpec b;
+        b.shape = world.add_shape(scaled ? grid_ball(0.5e-3, 0.05e-3, 200, 0.6e-3) : grid_ball(1e-3, 0.1e-3, 200, 1.2e-3));
+        b.scale = scaled ? 2 : 1;
+        b.orientation = oblique();
+        world.add_body(b);
+        add_sphere(world, world.add_shape(Shape::sphere()), 2e-3, 1.98e-3 * Vec3(0.48, 0.6, 0.64));
+        ASSERT_EQ(world.contacts().size(), 1u);
+        force[scaled] = world.contact_forces()[1];
+        torque[scaled] = world.contact_torques()[0];
+    }
+    EXPECT_NEAR(force[0].norm() / (2e5 * 2e-5 * 0.5), 1.0, 0.15) << "R*/R = 1/2 against a ball of its own size; the chords of the triangles take 2 um of 20";
+    EXPECT_LT((force[1] - force[0]).norm(), 1e-4 * force[0].norm());
+    EXPECT_LT((torque[1] - torque[0]).norm(), 1e-4 * force[0].norm() * 1e-3);
+}
+
 TEST(WallPress, force_is_the_gradient_of_the_stored_energy)
 {
     World world = cavity_world(carved(three_bores, 3.8e-3, 2e-4), SphereScheme::walls);
