@@ -124,10 +124,13 @@ public:
             ++s.node_queries;
             NodeContact c;
             c.node = node;
-            c.arm = rotation * surface.nodes()[std::size_t(node)];
+            // Nodes are many and far apart in memory: what touches carries its own.
+            const bool carried = held && past->stiffness > 0.0;
+            c.place = carried ? past->place : surface.nodes()[std::size_t(node)];
+            c.arm = rotation * c.place;
             if (held) c.cell = past->cell;
             c.depth = -field_(world_.x[a_] + c.arm, c.gradient, c.cell);
-            c.stiffness = stiffness_ * surface.node_areas()[std::size_t(node)];
+            c.stiffness = carried ? past->stiffness : stiffness_ * surface.node_areas()[std::size_t(node)];
             if (c.depth <= 0.0) {
                 if (held) release(*past, 0.0, Vec3::Zero(), s), ++past;
                 continue;

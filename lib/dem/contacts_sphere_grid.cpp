@@ -259,11 +259,25 @@ void World::Impl::sphere_grid_loop(double dt)
         std::vector<Crossing>& crossing = crossings[base + block];
         GeneralForce* const begin = l.out.data() + first;
         GeneralForce* out = begin;
+        std::size_t count = first;
         for (std::size_t k = first; k < last; ++k) {
             if (l.touch[k] == 0) {
                 const double room = double(l.clearance[k]) - steepest * grid_drift[std::size_t(l.grid[k])];
                 if (room > 0.0 && room * room > steepest * steepest * moved2[std::size_t(l.sphere[k])]) continue;
             }
+            l.near[count++] = Index(k);
+        }
+        // What a pair keeps is large and far from that of the next one: it is asked for ahead of its turn.
+        const auto fetch = [&](std::size_t n) {
+            const std::size_t k = std::size_t(l.near[n]);
+            for (const auto& [data, size] : {std::pair<const void*, std::size_t>{&l.press[k], sizeof(PressMemory)}, {&l.slots[k], sizeof(Slots)}})
+                for (std::size_t byte = 0; byte < size; byte += 64) __builtin_prefetch(static_cast<const char*>(data) + byte, 1);
+        };
+        constexpr std::size_t ahead = 4;
+        for (std::size_t n = first; n < std::min(first + ahead, count); ++n) fetch(n);
+        for (std::size_t n = first; n < count; ++n) {
+            if (n + ahead < count) fetch(n + ahead);
+            const std::size_t k = std::size_t(l.near[n]);
             ++s.node_queries;
             const bool on_grid = shapes[std::size_t(shape[std::size_t(l.grid[k])])]->kind() == ShapeKind::grid;
             if (all_walls && on_grid ? press_on_walls(k, dt, *out, s, crossing) : press_on_nearest(k, dt, *out, s, crossing)) ++out;

@@ -122,6 +122,7 @@ void make_sphere_grid_list(World::Impl& world, const std::vector<BroadPair>& pai
         if (shape.kind() == ShapeKind::grid) world.facets_of(world.shape[j]).gather(local / scale, within / scale, l.facet);
         l.facet_start.push_back(Index(l.facet.size()));
     }
+    l.near.resize(l.sphere.size());
     l.out.resize(l.sphere.size());
 }
 

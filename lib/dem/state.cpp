@@ -124,6 +124,7 @@ void World::restore(std::span<const std::uint8_t> state)
             if (m.shapes[std::size_t(m.shape[std::size_t(grid)])]->kind() == ShapeKind::grid) m.facets_of(m.shape[std::size_t(grid)]);
     m.spheres.make_room();
     m.sphere_walls.make_room();
+    m.sphere_grids.near.resize(m.sphere_grids.sphere.size());
 }
 
 }  // namespace coral::dem

@@ -141,12 +141,14 @@ struct SphereGridList {
     std::vector<Vec3> listed;                 ///< centre of the sphere when the list was made, frame and scale of the shape [m]
     std::vector<Index> facet_start;           ///< has one more entry
     std::vector<detail::Facets::Near> facet;  ///< triangles within the skin, nearest first
+    std::vector<Index> near;  ///< for the loop: entries that may touch, block by block
     std::vector<GeneralForce> out;
 };
 
 /// A surface node that touches, and what it keeps from one step to the next: all at the end of the last step, world frame.
 struct NodeContact {
     Index node = 0;
+    Vec3 place = Vec3::Zero();           ///< of the node, shape frame
     std::uint8_t touch = 0;              ///< 1 touching, 2 touching without force (clamped)
     double depth = 0, stiffness = 0;     ///< stiffness: k_a A
     double force = 0;                    ///< along the gradient's direction; elastic, then with the dashpot's part
