@@ -65,6 +65,7 @@ Sample pack(const Spec& spec, std::uint64_t seed, detail::Keeper& keeper)
     sample.walls = box_walls(sample.size);
     dem::WorldOptions options;
     options.gravity = spec.gravity;
+    if (spec.all_walls) options.sphere_scheme = dem::SphereScheme::walls;
     options.force_step = spec.force_step;
     dem::World world(options);
     const SampleIds ids = add_sample(world, sample);

@@ -110,6 +110,7 @@ struct Case {
     std::array<FaceCondition, 6> boundary{};
     std::optional<FluidSpec> fluid;
     Eigen::Vector3d gravity{0, 0, -9.81};  ///< [m/s2]
+    bool all_walls = false;                ///< [contact] spheres = "walls": dem::SphereScheme::walls
     /// Whether the file has [material.default]; otherwise grains of a sample keep the sample's materials.
     bool overrides_material = false;
     std::map<std::string, MaterialSpec> materials;
