@@ -47,7 +47,8 @@ const std::vector<TimeFigure>& time_figures()
          {{"", "hydraulic gradient [-]", 1, false, {{"hydraulic_gradient", ""}}}}},
         {"hydraulic_conductivity", "Hydraulic conductivity", "Superficial velocity over hydraulic gradient [Fig. 15b].",
          {{"", "hydraulic conductivity [cm/s]", 100, false, {{"hydraulic_conductivity", ""}}}}},
-        {"trapped_fines", "Trapped fines", "Fines whose centre lies in a void inside a grain [Fig. 12].",
+        {"trapped_fines", "Trapped fines", "Fines whose centre lies in a void inside a grain [Fig. 12]. Unless [contact] spheres = \"walls\", throats of level sets are tighter for spheres by "
+         "about half a lattice spacing, which overstates trapping.",
          {{"", "trapped fines [count]", 1, false, {{"trapped_count", ""}}}}},
         {"flow_velocity", "Flow between and inside grains",
          "Mean speed of the water between the grains, and inside their voids (within the filled shape of a grain) [Fig. 17].",

@@ -39,6 +39,14 @@ void expect_message(const std::string& spec, const std::string& part)
 
 }  // namespace
 
+TEST(PackingSpec, spheres_press_on_the_nearest_wall_or_on_all)
+{
+    EXPECT_FALSE(spec_of(box + coarse + fine).all_walls);
+    EXPECT_TRUE(spec_of(box + coarse + fine + "[contact]\nspheres = \"walls\"\n").all_walls);
+    expect_message(box + coarse + fine + "[contact]\nspheres = \"wals\"\n", "walls");
+    expect_message(box + coarse + fine + "[contact]\nsphere = \"walls\"\n", "spheres");
+}
+
 TEST(PackingSpec, reads_units_and_defaults)
 {
     const Spec s = spec_of(box + coarse + fine + "[compression]\npressure = \"50kPa\"\n[material.default]\nfriction = 0.5\n[time]\ndem_step = \"2e-6s\"\n");
