@@ -191,7 +191,9 @@ bool World::Impl::lists_expired() const
     for (std::size_t i = 0; i < x.size(); ++i) {
         const double way2 = (x[i] - x_reference[i]).squaredNorm();
         if (way2 > limit * limit) return true;
-        if (!mixed || !has_nodes[i]) continue;
+        if (!in[i] || !has_nodes[i]) continue;
+        if (drift_since_listed(i) > free_path * nodes.skin) return true;
+        if (!mixed) continue;
         if (std::sqrt(way2) + turn_between(q[i], q_reference[i]) * radius[i] > limit) return true;
     }
     return false;

@@ -282,6 +282,22 @@ TEST(SphereOnGrid, linked_rings_hold_each_other)
     EXPECT_NEAR(world.contacts().at(0).normal_force.norm(), 1.0, 0.02);
 }
 
+// Two pairs in a row that push each other apart, towards a gap of which no node was near at the start.
+TEST(Relaxation, finds_the_contacts_that_it_makes_itself)
+{
+    World world = quiet_world(0, 0);
+    const double radius = 7.5e-3;
+    const int ball = world.add_shape(grid_ball(radius, 2e-4, 6000, 1e-3));
+    for (const double x : {0.0, 2 * radius - 1e-3, 4 * radius - 0.2e-3, 6 * radius - 1.2e-3}) {
+        BodySpec body;
+        body.shape = ball;
+        body.position = Vec3(x, 0, 0);
+        world.add_body(body);
+    }
+    world.relax(1e-3, 2000);
+    for (int k = 0; k < 3; ++k) EXPECT_GT((world.position(k + 1) - world.position(k)).norm(), 2 * radius - 1.5e-5) << k;
+}
+
 TEST(Shapes, bad_data_is_refused_with_its_name)
 {
     GridShapeData d;
