@@ -64,13 +64,15 @@ $(out)/grains.sh.h5: $(out)/grains.vdb $(bin)/ls2sh $(out)/.ls2sh.options
 
 $(out)/sample.h5: $(out)/grains.vdb $(spec) $(bin)/pack-sample $(out)/.pack.options
 	$(call say,pack-sample: gap-graded sample)
-	@$(pack) -o $@
+	@resume=; last=$@.checkpoint; [ $$last -nt $(out)/.pack.options ] && [ $$last -nt $(spec) ] && [ $$last -nt $< ] && [ $$last -nt $(bin)/pack-sample ] && resume=--resume; \
+	    $(pack) $$resume -o $@
+	@[ ! -f $@.checkpoint ] || { echo "stopped before the end; the same make command goes on" >&2; exit 1; }
 
 $(out)/case/case.toml: $(out)/sample.h5 $(bin)/make-case $(out)/.case.options
 	$(call say,make-case: domain and plan of the run)
 	@$(case) -o $(@D)
 
-# A run that was interrupted goes on from its checkpoint, unless the case is newer.
+# A run that was interrupted goes on from its checkpoint, as a packing does, unless the case is newer.
 $(out)/suffuse.txt: $(out)/case/case.toml $(bin)/suffuse $(out)/.suffuse.options
 	$(call say,suffuse: flow and erosion)
 	@resume=; [ $(out)/case/checkpoint.h5 -nt $(out)/case/case.toml ] && [ $(out)/case/checkpoint.h5 -nt $(bin)/suffuse ] && resume=--resume; \
