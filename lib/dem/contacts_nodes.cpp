@@ -143,9 +143,7 @@ public:
             const Vec3 push = c.force * c.gradient;
             if (held) {
                 release(*past, stored, push, s, &c);
-                c.touch = past->touch;
                 c.spring = past->spring;
-                c.pull = past->pull;
                 old_.push_back(*past++);
             } else {
                 if (dt_ > 0.0) error_.add(-stored - 0.5 * dt_ * push.dot(velocity_now(c.arm)), stored, push, c.arm);

@@ -121,7 +121,7 @@ void open_contact(const Opening& o, PointMemory& memory, std::uint8_t& touch, bo
     else s.damping -= 0.5 * dt * memory.drag.dot(full);
     if (o.law.friction > 0.0) s.friction += 0.5 * o.law.kt * (memory.spring.squaredNorm() + dt * memory.spring.dot(slide));
     if (facing && touch == 1 && dt > 0.0)
-        detail::add_crossing(crossing, o.a, o.b, o.law, memory.overlap, o.overlap, o.approach, o.root_mass, dt, o.normal, Vec3::Zero(), s);
+        detail::add_crossing(crossing, o.a, o.b, o.law, memory.overlap, o.overlap, o.approach, o.root_mass, dt, o.normal, s);
     memory = {};
     touch = 0;
 }
@@ -197,7 +197,7 @@ void World::Impl::sphere_loop(double dt)
                 if (l.touch[m.entry[k]] == 0 && dt > 0.0) {
                     const Vec3 past = detail::lane(d, k) - dt * detail::lane(g.relative, k);
                     detail::add_crossing(crossing, m.a[k], m.b[k], *m.law[k], g.radius_a[k] + g.radius_b[k] - past.norm(), g.overlap[k], g.approach[k],
-                                         g.root_mass[k], dt, detail::lane(g.normal, k), Vec3::Zero(), s);
+                                         g.root_mass[k], dt, detail::lane(g.normal, k), s);
                 }
             put_back(m, g, r, [](Index b) { return b; }, l.memory, l.touch, out);
             sums_of_lanes.add(m, g, r, options.overlap_cap);
@@ -213,7 +213,7 @@ void World::Impl::sphere_loop(double dt)
 void World::Impl::sphere_wall_loop(double dt)
 {
     SphereWallList& l = sphere_walls;
-    const std::size_t base = (spheres.rows.size() + row_grain - 1) / row_grain;
+    const std::size_t base = out_count[0].size();
     parallel_blocks(l.body.size(), entry_grain, [&](std::size_t first, std::size_t last) {
         const std::size_t block = first / entry_grain;
         LoopSums s;
@@ -275,7 +275,7 @@ void World::Impl::sphere_wall_loop(double dt)
                 if (l.touch[m.entry[k]] == 0 && dt > 0.0) {
                     const Vec3 n = detail::lane(g.normal, k);
                     detail::add_crossing(crossing, m.a[k], -1 - m.b[k], *m.law[k], g.overlap[k] + dt * detail::lane(g.relative, k).dot(n), g.overlap[k],
-                                         g.approach[k], g.root_mass[k], dt, n, Vec3::Zero(), s);
+                                         g.approach[k], g.root_mass[k], dt, n, s);
                 }
             put_back(m, g, r, [](Index b) { return -1 - b; }, l.memory, l.touch, out);
             sums_of_lanes.add(m, g, r, options.overlap_cap);

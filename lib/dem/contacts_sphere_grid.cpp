@@ -66,16 +66,15 @@ struct Places {
         force[best] += press.force;
         energy[best] += press.energy;
     }
-    /// A deep press that was taken for several places, seen as one. \returns whether `from` became part of `to`
-    bool merge(int to, int from)
+    /// A deep press that was taken for several places, seen as one: `from` becomes part of `to`.
+    void merge(int to, int from)
     {
         const double product = force[to].norm() * force[from].norm();
-        if (!(product > 0.0) || force[to].dot(force[from]) < same_wall * product) return false;
+        if (!(product > 0.0) || force[to].dot(force[from]) < same_wall * product) return;
         force[to] += force[from];
         energy[to] += energy[from];
         force[from].setZero();
         if (slot[to] < 0) std::swap(slot[to], slot[from]);
-        return true;
     }
 };
 

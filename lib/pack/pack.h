@@ -50,7 +50,7 @@ struct PackControl {
 /// Walls are smooth throughout.
 /// \param report  set anew
 /// \throws UsageError  grains that do not fit
-/// \throws Error       grains lost through a wall, or pressed into each other by more than a quarter of their size; a checkpoint that is
+/// \throws Error       grains lost through a wall, or pressed into each other by more than half of the smaller radius; a checkpoint that is
 ///                     damaged or belongs to another packing
 /// \return an empty sample when `report.interrupted`. A packing that was stopped and resumed gives the same sample as one that was not.
 Sample pack(const Spec& spec, std::uint64_t seed, PackReport& report, const PackControl& control = {});

@@ -250,8 +250,7 @@ struct World::Impl {
     LoopSums sums;
     double time = 0;
     double dissipated_friction = 0, dissipated_damping = 0, gravity_work = 0, external_work = 0, wall_work = 0, initial = 0;
-
-    double last_dt = 0, initial_account = 0;
+    double last_dt = 0, initial_account = 0;  ///< initial_account: on_account() when the ledger was started
     bool ledger_started = false;
     Counters counters;
 
