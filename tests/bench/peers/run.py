@@ -16,20 +16,10 @@ import statistics
 import subprocess
 import sys
 
+from scene_file import read_scene
+
 here = os.path.dirname(os.path.abspath(__file__))
 Result = collections.namedtuple("Result", "cpu wall report state")
-
-
-def read_scene(file):
-    header, rows = {}, []
-    with open(file) as lines:
-        for line in lines:
-            words = line.lstrip("# ").split()
-            if line.startswith("#"):
-                header[words[0]] = [float(word) for word in words[1:]]
-            else:
-                rows.append([float(word) for word in words])
-    return header, rows
 
 
 def command(arguments, cores=1, **settings):

@@ -4,21 +4,10 @@ import math
 import os
 import time
 
+from scene_file import read_scene
 from yade import *
 
 settings = json.loads(os.environ["PEER"])
-
-
-def read_scene(file):
-    header, rows = {}, []
-    with open(file) as lines:
-        for line in lines:
-            words = line.lstrip("# ").split()
-            if line.startswith("#"):
-                header[words[0]] = [float(word) for word in words[1:]]
-            else:
-                rows.append([float(word) for word in words])
-    return header, rows
 
 
 def add_box(header, material):
