@@ -236,10 +236,35 @@ void FineCoupling::feel(const Flow& flow, std::span<FeltFlow> felt) const
     sums_.resize(count_);
     gather(
         felt_, [&](std::size_t b) { return quad(block_quads_, b); }, sums_);
+    const bool removed = options_.self_disturbance == SelfDisturbance::removed;
     for (std::size_t i = 0; i < count_; ++i) {
-        felt[i].void_fraction = bulk_void_fraction(sums_[i][0], own_solid_[i]);
-        felt[i].velocity = sums_[i].tail<3>() / sums_[i][0];
+        FeltFlow& f = felt[i];
+        f.void_fraction = bulk_void_fraction(sums_[i][0], own_solid_[i]);
+        f.velocity = sums_[i].tail<3>() / sums_[i][0];
+        f.isolation = removed ? isolation(sums_[i][0], own_solid_[i]) : 0.0;
+        f.own_solid = own_solid_[i];
+        f.support_radius = radius_[i];
+        f.wide_pressure_gradient = f.pressure_gradient;
     }
+    if (removed) gather_wide_pressure_gradient(flow, felt);
+}
+
+void FineCoupling::gather_wide_pressure_gradient(const Flow& flow, std::span<FeltFlow> felt) const
+{
+    const double* p = flow.pressure().data();
+    average_blocks(block_quads_, [&](int j, int k, double* const* rows) {
+        const double* at = p + layout_.index(0, j, k);
+        const int n = grid_.cells.x();
+        const double scale = 0.5 / grid_.cell;
+        for (int d = 0; d < 3; ++d) {
+            const std::ptrdiff_t s = layout_.stride[d];
+            for (int i = 0; i < n; ++i) rows[d][i] = scale * (at[i + s] - at[i - s]);
+        }
+        std::fill(rows[3], rows[3] + n, 0.0);
+    });
+    gather(
+        felt_, [&](std::size_t b) { return quad(block_quads_, b); }, sums_);
+    for (std::size_t i = 0; i < count_; ++i) felt[i].wide_pressure_gradient = sums_[i].head<3>();
 }
 
 /// Four values of each cell of a row, from those of the blocks divided by how open the cells are.

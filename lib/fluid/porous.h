@@ -1,6 +1,6 @@
 #pragma once
 /// \file fluid/porous.h
-/// Fines in the flow: kernel averages both ways. Each particle spreads its volume and its reaction over cells around
+/// Fines in the flow: kernel averages both ways. The force on them is in fluid/fine_force.h. Each particle spreads its volume and its reaction over cells around
 /// it, and feels averages of the flow, all with the weights  w_ic = k(2 dist/R) (1 - phi_c) / sum  of Peskin's
 /// four-point kernel [Huang et al., eq. 15, with 4 r^2 for the printed 4 r^4], R the support radius. Cells beyond a
 /// wall are folded back by reflection, cells in resolved grains (phi_c) take no part, and the weights of each particle
@@ -15,13 +15,21 @@ namespace coral::fluid {
 /// Peskin's four-point kernel along the radius, r >= 0; 0 from r = 2 on.
 double peskin_kernel(double r);
 
+/// What a particle feels of itself: its own volume in the void fraction, its own wake and the pressure it makes itself.
+/// Drag laws want the flow without it [Evrard et al. 2020, J. Comput. Phys. X 8:100078].
+enum class SelfDisturbance {
+    removed,         ///< all of it is taken out: bulk_void_fraction(), fine_force()
+    volume_removed,  ///< from the void fraction only
+    kept,            ///< plain kernel means, as in the paper
+};
+
 struct KernelOptions {
     double volume_support =
         2.0;  ///< diameter of the support over the particle diameter, for void fraction and pressure force
     double felt_support = 4.0;      ///< the same for what a particle feels and for its drag reaction
     double smallest_support = 3.0;  ///< lower limit of the volume support [cells]; the felt one keeps its ratio to it
     double smallest_void_fraction = 0.15;
-    bool exclude_own_volume = true;  ///< see bulk_void_fraction(); false: the plain kernel mean
+    SelfDisturbance self_disturbance = SelfDisturbance::removed;
     int coupling_cells =
         0;  ///< felt averages work on blocks of this many cells along an edge; 0 chooses (1 when d < 3 cells)
 };
@@ -33,17 +41,25 @@ struct KernelOptions {
 /// bed.
 /// \param felt  kernel mean of the void fraction \param own_solid  part of 1 - felt that is the particle itself
 double bulk_void_fraction(double felt, double own_solid);
+/// The factor S above: the part of a particle's own disturbance that its neighbours do not make up for. 1 alone, 0.02 in
+/// a dense bed.
+double isolation(double felt, double own_solid);
 
 /// What one particle feels.
 struct FeltFlow {
     double void_fraction = 1.0;                                   ///< wide kernel, bulk_void_fraction()
     Eigen::Vector3d velocity = Eigen::Vector3d::Zero();           ///< interstitial, wide kernel [m/s]
     Eigen::Vector3d pressure_gradient = Eigen::Vector3d::Zero();  ///< of the kinematic pressure, volume kernel [m/s2]
+    /// The same with the wide kernel; the volume kernel's where SelfDisturbance is not `removed` [m/s2].
+    Eigen::Vector3d wide_pressure_gradient = Eigen::Vector3d::Zero();
+    double isolation = 0.0;       ///< S; 0 where SelfDisturbance is not `removed`
+    double own_solid = 0.0;       ///< part of the mean solid fraction of the wide kernel that is the particle itself
+    double support_radius = 1.0;  ///< of the wide kernel [m]
 };
 
 /// Kernel weights of a set of fines for one step. Call, each flow step:
 ///     place(positions, diameters, cell_solid); deposit_volume(flow, volumes, velocities); feel(flow, felt);
-///     ... drag from fluid/drag.h: b_i and F_i with F_i' = dF_i/du = b_i ...
+///     ... force from fluid/fine_force.h: b_i and F_i with F_i' = dF_i/du = b_i ...
 ///     deposit_drag(flow, b, F); flow.predict(dt); drag_lag(flow, lag) -> F_i + lag_i is the drag the particle really
 ///     gets.
 /// Then fluid + particles exchange momentum to round-off.
@@ -114,6 +130,8 @@ private:
     void deposit_flux(int axis, Field& flux) const;
     void find_own_overlap();
     void gather_pressure_gradient(const Flow& flow, std::span<FeltFlow> felt) const;
+    void gather_wide_pressure_gradient(const Flow& flow, std::span<FeltFlow> felt) const;
+    double support_radius(double diameter) const;
     template <class Fill>
     void average_blocks(Quads& quads, const Fill& fill) const;
     void cell_row(const Quads& block_values, int j, int k, double* row) const;
@@ -128,6 +146,7 @@ private:
     std::vector<Weights> volume_, felt_;
     std::vector<double> own_overlap_;  // sum_c w_ic (volume) w_ic (felt): solid fraction felt of itself, per h3
     std::vector<double> own_solid_;    // the same times its volume / h3
+    std::vector<double> radius_;       // of the felt support [m]
     Field open_cells_, open_blocks_;  // 1 - phi per cell (padded); its sum per block
     Field void_fraction_;             // of the next step; changes places with the flow's
     Field clip_;                      // (1 - eps)/(raw solid fraction); empty when nothing is clipped

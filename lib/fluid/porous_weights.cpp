@@ -57,11 +57,16 @@ double peskin_kernel(double r)
     return r <= 1.0 ? inner : (r <= 2.0 ? outer : 0.0);
 }
 
-double bulk_void_fraction(double felt, double own_solid)
+double isolation(double felt, double own_solid)
 {
     const double others = std::max(1.0 - felt - own_solid, 0.0);
     const double open = 1.0 - others, wide = 1.0 + 2.0 * others;
-    return felt + own_solid * open * open * open * open / (wide * wide);
+    return open * open * open * open / (wide * wide);
+}
+
+double bulk_void_fraction(double felt, double own_solid)
+{
+    return felt + own_solid * isolation(felt, own_solid);
 }
 
 FineCoupling::FineCoupling(const GridSpec& grid, const KernelOptions& options)
@@ -225,6 +230,12 @@ void FineCoupling::add_particle(Weights& weights, const Target& target, const Fi
     weights.first_value.push_back(weights.values.size());
 }
 
+/// Radius of the volume kernel [m].
+double FineCoupling::support_radius(double diameter) const
+{
+    return 0.5 * std::max(options_.volume_support * diameter, options_.smallest_support * grid_.cell);
+}
+
 void FineCoupling::find_weights(std::vector<Weights>& chunks, const Target& target, const Field& open, double factor,
                                 std::span<const Vector3d> positions, std::span<const double> diameters) const
 {
@@ -235,9 +246,7 @@ void FineCoupling::find_weights(std::vector<Weights>& chunks, const Target& targ
         weights.first_row.assign(1, 0), weights.first_value.assign(1, 0);
         for (std::size_t o = begin; o < end; ++o) {
             const std::size_t p = order_[o];
-            const double support =
-                std::max(options_.volume_support * diameters[p], options_.smallest_support * grid_.cell);
-            add_particle(weights, target, open, 0.5 * factor * support, positions[p]);
+            add_particle(weights, target, open, factor * support_radius(diameters[p]), positions[p]);
         }
     });
 }
@@ -245,7 +254,7 @@ void FineCoupling::find_weights(std::vector<Weights>& chunks, const Target& targ
 void FineCoupling::find_own_overlap()
 {
     own_overlap_.assign(count_, 0.0);
-    if (!options_.exclude_own_volume) return;
+    if (options_.self_disturbance == SelfDisturbance::kept) return;
     parallel_blocks(volume_.size(), 1, [&](std::size_t chunk, std::size_t) {
         thread_local Field felt;  // zero between particles
         felt.resize(blocks_.total, 0.0);
@@ -303,7 +312,10 @@ void FineCoupling::place(std::span<const Vector3d> positions, std::span<const do
     choose_blocks(diameters);
     find_open(cell_solid);
     find_weights(volume_, cells_, open_cells_, 1.0, positions, diameters);
-    find_weights(felt_, blocks_, open_blocks_, options_.felt_support / options_.volume_support, positions, diameters);
+    const double wide = options_.felt_support / options_.volume_support;
+    find_weights(felt_, blocks_, open_blocks_, wide, positions, diameters);
+    radius_.resize(count_);
+    for (std::size_t p = 0; p < count_; ++p) radius_[p] = wide * support_radius(diameters[p]);
     find_own_overlap();
 }
 

@@ -57,13 +57,13 @@ void Fines::deposit(fluid::Flow& flow, double dt, const Scene& scene, const flui
     mean_felt_ = 0;
     for (std::size_t i = 0; i < ids_.size(); ++i) {
         const std::size_t id = static_cast<std::size_t>(ids_[i]);
-        const Vector3d slip = felt_[i].velocity - velocities_[i];
-        const double b = fluid::drag_coefficient(law_, felt_[i].void_fraction, slip.norm(), diameters_[i], density_, viscosity_);
-        // Drag at the velocity the body will have: linear in it, so solved at once. Stable for any dt, exact at rest and at terminal speed.
+        const fluid::FineParticle particle{velocities_[i], diameters_[i], volumes_[i], {}};
+        const fluid::FineForce now = fluid::fine_force(law_, particle, felt_[i], density_, viscosity_);
+        // Force at the velocity the body will have: linear in it, so solved at once. Stable for any dt, exact at rest and at terminal speed.
         const bool moves = scene.world.motion(ids_[i]) == dem::Motion::free;
-        const double response = moves ? 1 / (1 + dt * b / scene.bodies[id].mass) : 1;
-        coefficients_[i] = b * response;
-        drag_[i] = coefficients_[i] * (moves ? (slip - dt * other_[id]).eval() : slip);
+        const double response = moves ? 1 / (1 + dt * now.coefficient / scene.bodies[id].mass) : 1;
+        coefficients_[i] = now.coefficient * response;
+        drag_[i] = response * (moves ? (now.force - dt * now.coefficient * other_[id]).eval() : now.force);
         mean_felt_ += felt_[i].void_fraction / static_cast<double>(ids_.size());
     }
     kernel_.deposit_drag(flow, coefficients_, drag_);

@@ -4,8 +4,7 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "fluid/drag.h"
-#include "fluid/porous.h"
+#include "fluid/fine_force.h"
 #include "suffusion/scene.h"
 
 namespace coral::suffusion {
