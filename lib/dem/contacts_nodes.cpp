@@ -1,5 +1,6 @@
 // Contact of surface nodes with a distance field (grid or wall), and the ordered sums of all contact loops.
 #include <cmath>
+#include <limits>
 #include <span>
 
 #include "core/parallel.h"
@@ -75,7 +76,7 @@ struct WorkError {
 /// One pair of the node list as it stands in this step. Three passes over its touching nodes: elastic forces, dashpots, friction.
 class NodePair {
 public:
-    NodePair(const World::Impl& world, std::size_t p, double dt) : world_(world), list_(world.nodes), p_(p), dt_(dt)
+    NodePair(World::Impl& world, std::size_t p, double dt) : world_(world), list_(world.nodes), p_(p), dt_(dt)
     {
         const std::size_t a = a_ = std::size_t(list_.slave[p]);
         const Index master = list_.master[p];
@@ -116,11 +117,16 @@ public:
         const Shape& surface = *world_.shapes[std::size_t(world_.shape[a_])];
         const Eigen::Matrix3d rotation = world_.scale[a_] * world_.q[a_].toRotationMatrix();
         auto past = old.begin();
+        float least = std::numeric_limits<float>::infinity();
         for (Index k = list_.start[p_]; k < list_.start[p_ + 1]; ++k) {
             const Index node = list_.node[std::size_t(k)];
             for (; past != old.end() && past->node < node; ++past) release(*past, 0.0, Vec3::Zero(), s);
             const bool held = past != old.end() && past->node == node;
-            if (!held && double(list_.clearance[std::size_t(k)]) > near) continue;
+            float& clearance = list_.clearance[std::size_t(k)];
+            if (!held && double(clearance) > near) {
+                least = std::min(least, clearance);
+                continue;
+            }
             ++s.node_queries;
             NodeContact c;
             c.node = node;
@@ -131,6 +137,9 @@ public:
             if (held) c.cell = past->cell;
             c.depth = -field_(world_.x[a_] + c.arm, c.gradient, c.cell);
             c.stiffness = carried ? past->stiffness : stiffness_ * surface.node_areas()[std::size_t(node)];
+            constexpr float none = -std::numeric_limits<float>::infinity();
+            clearance = c.depth > 0.0 ? none : std::nextafter(float(near - c.depth - list_.slack()), none);
+            least = std::min(least, clearance);
             if (c.depth <= 0.0) {
                 if (held) release(*past, 0.0, Vec3::Zero(), s), ++past;
                 continue;
@@ -152,6 +161,7 @@ public:
             now.push_back(c);
         }
         for (; past != old.end(); ++past) release(*past, 0.0, Vec3::Zero(), s);
+        list_.least[p_] = least;
     }
 
     void damp(std::span<NodeContact> contacts, LoopSums& s)
@@ -255,7 +265,7 @@ private:
     }
 
     const World::Impl& world_;
-    const NodeList& list_;
+    NodeList& list_;
     std::size_t p_, a_;
     double dt_;
     Field field_;
@@ -289,8 +299,8 @@ void World::Impl::node_loop(double dt)
         GeneralForce* out = begin;
         for (std::size_t p = first; p < last; ++p) {
             s.tests += l.start[p + 1] - l.start[p];
-            // What was farther away when it was listed than both sides have come since is not looked at.
-            const double near = steepest * (l.drift_of(l.slave[p]) + l.drift_of(l.master[p]));
+            // What was farther away when it was last looked at than both sides have come since is not looked at.
+            const double near = steepest * (l.way_of(l.slave[p], l.master[p]) - l.way_listed[p]);
             const Index from = Index(fresh.size());
             if (l.count[p] > 0 || double(l.least[p]) <= near) {
                 NodePair pair(*this, p, dt);
@@ -396,7 +406,9 @@ void World::Impl::refresh_forces()
     const double before = sums.elastic_normal + sums.elastic_tangential;
     const double friction = dissipated_friction;
     // Whoever moved the bodies: everything listed is looked at.
-    std::fill(nodes.drift.begin(), nodes.drift.end(), free_path * nodes.skin);
+    for (std::size_t i = 0; i < x.size(); ++i)
+        if (in[i] && has_nodes[i]) note_way(i);
+    for (std::size_t k = 0; k < walls.size(); ++k) note_wall_way(k);
     std::fill(moved2.begin(), moved2.end(), free_path * skin * free_path * skin);
     std::fill(grid_drift.begin(), grid_drift.end(), free_path * skin);
     w_before = w;

@@ -143,8 +143,7 @@ World::Impl::Worn World::Impl::kick_and_drift(double dt)
         WallData& wall = walls[k];
         wall.point += dt * wall.velocity;
         all.farthest = std::max(all.farthest, (wall.point - wall.reference).norm());
-        nodes.wall_drift[k] = (wall.point - nodes.wall_listed[k]).norm();
-        all.node_farthest = std::max(all.node_farthest, nodes.wall_drift[k]);
+        all.node_farthest = std::max(all.node_farthest, note_wall_way(k));
     }
     if (!std::isfinite(all.finite)) check_numbers();
     return {all.farthest > limit, all.node_farthest > free_path * nodes.skin};
@@ -180,8 +179,7 @@ World::Impl::Drift World::Impl::drift_bodies(std::size_t first, std::size_t last
                 grid_drift[i] = std::sqrt(way2) + turn_between(q[i], q_reference[i]) * radius[i];
                 sum.farthest = std::max(sum.farthest, grid_drift[i]);
             }
-            nodes.drift[i] = drift_since_listed(i);
-            sum.node_farthest = std::max(sum.node_farthest, nodes.drift[i]);
+            sum.node_farthest = std::max(sum.node_farthest, note_way(i));
         } else {
             turn_sphere(q[i], turn);
         }

@@ -183,7 +183,7 @@ void World::Impl::make_blocks()
     crossings.resize(std::max(crossings.size(), count));
 }
 
-bool World::Impl::lists_expired() const
+bool World::Impl::lists_expired()
 {
     const double limit = free_path * skin;
     for (const WallData& wall : walls)
@@ -192,7 +192,7 @@ bool World::Impl::lists_expired() const
         const double way2 = (x[i] - x_reference[i]).squaredNorm();
         if (way2 > limit * limit) return true;
         if (!in[i] || !has_nodes[i]) continue;
-        if (drift_since_listed(i) > free_path * nodes.skin) return true;
+        if (note_way(i) > free_path * nodes.skin) return true;
         if (!mixed) continue;
         if (std::sqrt(way2) + turn_between(q[i], q_reference[i]) * radius[i] > limit) return true;
     }

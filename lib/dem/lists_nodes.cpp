@@ -41,10 +41,11 @@ std::vector<Directed> direct(const World::Impl& world, const std::vector<BroadPa
     return directed;
 }
 
-/// Nodes of `slave` within `reach` of a partner, tested cluster by cluster; clearances are less by `shift`.
+/// Nodes of `slave` within reach of a partner, tested cluster by cluster.
 template <class Distance>
-void append_nodes(const World::Impl& world, Index slave, double reach, double shift, const Distance& distance, NodeList& l)
+void append_nodes(const World::Impl& world, Index slave, const Distance& distance, NodeList& l)
 {
+    const double reach = l.skin + l.slack();
     const std::size_t a = std::size_t(slave);
     const Shape& shape = *world.shapes[std::size_t(world.shape[a])];
     const double scale = world.scale[a];
@@ -58,7 +59,7 @@ void append_nodes(const World::Impl& world, Index slave, double reach, double sh
             for (int n = cluster.begin; n < cluster.end; ++n)
                 if (const double d = distance(rotation * shape.nodes()[std::size_t(n)]); d < reach) {
                     l.node.push_back(n);
-                    l.clearance.push_back(std::nextafter(float(d - shift), -std::numeric_limits<float>::infinity()));
+                    l.clearance.push_back(std::nextafter(float(d - l.slack()), -std::numeric_limits<float>::infinity()));
                 }
         }
     }
@@ -67,24 +68,22 @@ void append_nodes(const World::Impl& world, Index slave, double reach, double sh
 void look_at(const World::Impl& world, const Directed& d, NodeList& l)
 {
     const std::size_t a = std::size_t(d.slave);
-    // What the two have come since their drift counts from is reckoned once more later on.
-    const double shift = steepest * (l.drift_of(d.slave) + l.drift_of(d.master)), reach = l.skin + shift;
     if (d.master >= 0) {
         const std::size_t b = std::size_t(d.master);
         const Vec3 to_b = world.periodic(world.x[a] - world.x[b]);
         const double scale = world.scale[b];
         const Eigen::Matrix3d to_local = world.q[b].toRotationMatrix().transpose() / scale;
         const detail::DistanceField field(*world.shapes[std::size_t(world.shape[b])]);
-        append_nodes(world, d.slave, reach, shift, [&](const Vec3& arm) { return scale * field.lower_bound(to_local * (to_b + arm)); }, l);
+        append_nodes(world, d.slave, [&](const Vec3& arm) { return scale * field.lower_bound(to_local * (to_b + arm)); }, l);
         return;
     }
     const WallData& wall = world.walls[std::size_t(-1 - d.master)];
     if (wall.kind == WallData::Kind::plane) {
         const double height = wall.normal.dot(world.x[a] - wall.point);
-        append_nodes(world, d.slave, reach, shift, [&](const Vec3& arm) { return height + wall.normal.dot(arm); }, l);
+        append_nodes(world, d.slave, [&](const Vec3& arm) { return height + wall.normal.dot(arm); }, l);
     } else {
         Vec3 gradient;
-        append_nodes(world, d.slave, reach, shift, [&](const Vec3& arm) { return wall.plate.distance_and_gradient(world.x[a] + arm, gradient); }, l);
+        append_nodes(world, d.slave, [&](const Vec3& arm) { return wall.plate.distance_and_gradient(world.x[a] + arm, gradient); }, l);
     }
 }
 
@@ -117,9 +116,15 @@ void NodeList::take_springs(std::vector<ContactSpring> springs)
     }
 }
 
-double World::Impl::drift_since_listed(std::size_t i) const
+double World::Impl::note_wall_way(std::size_t k)
 {
-    return (x[i] - nodes.x_listed[i]).norm() + turn_between(q[i], nodes.q_listed[i]) * radius[i];
+    Way& way = nodes.wall_ways[k];
+    const double now = (walls[k].point - way.x).norm();
+    if (!(now <= nodes.hop())) {
+        way.length += now;
+        way.x = walls[k].point;
+    }
+    return way.length - way.listed;
 }
 
 void World::Impl::list_nodes(const std::vector<BroadPair>* pairs)
@@ -133,33 +138,22 @@ void World::Impl::list_nodes(const std::vector<BroadPair>* pairs)
     NodeList& l = nodes;
     l = {};
     l.skin = node_skin * skin;
-    constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
-    l.x_listed = std::move(old.x_listed);
-    l.q_listed = std::move(old.q_listed);
-    l.wall_listed = std::move(old.wall_listed);
-    l.x_listed.resize(x.size(), Vec3::Constant(unknown));
-    l.q_listed.resize(x.size(), Quat::Identity());
-    l.wall_listed.resize(walls.size(), Vec3::Constant(unknown));
-    l.drift.assign(x.size(), 0.0);
-    l.wall_drift.assign(walls.size(), 0.0);
+    l.ways = std::move(old.ways);
+    l.wall_ways = std::move(old.wall_ways);
+    l.ways.resize(x.size());
+    l.wall_ways.resize(walls.size());
     // Whoever has used up half of the way is looked at anew, so that the lists last a while.
     const double keeps = l.skin == old.skin ? 0.5 * free_path * l.skin : -1.0;
     std::vector<std::uint8_t> moved(x.size(), 0), wall_moved(walls.size(), 0);
     for (std::size_t i = 0; i < x.size(); ++i) {
-        if (!in[i] || !has_nodes[i]) continue;
-        l.drift[i] = drift_since_listed(i);
-        if (l.drift[i] <= keeps) continue;
+        if (!in[i] || !has_nodes[i] || note_way(i) <= keeps) continue;
         moved[i] = 1;
-        l.x_listed[i] = x[i];
-        l.q_listed[i] = q[i];
-        l.drift[i] = 0.0;
+        l.ways[i].listed = l.ways[i].length;
     }
     for (std::size_t k = 0; k < walls.size(); ++k) {
-        l.wall_drift[k] = (walls[k].point - l.wall_listed[k]).norm();
-        if (l.wall_drift[k] <= keeps) continue;
+        if (note_wall_way(k) <= keeps) continue;
         wall_moved[k] = 1;
-        l.wall_listed[k] = walls[k].point;
-        l.wall_drift[k] = 0.0;
+        l.wall_ways[k].listed = l.wall_ways[k].length;
     }
 
     l.start.push_back(0);
@@ -173,6 +167,7 @@ void World::Impl::list_nodes(const std::vector<BroadPair>* pairs)
         const bool known = o < old.slave.size() && old.slave[o] == d.slave && old.master[o] == d.master;
         const bool stays = known && !moved[std::size_t(d.slave)] && !(d.master < 0 ? wall_moved[std::size_t(-1 - d.master)] : moved[std::size_t(d.master)]);
         const std::size_t begin = l.node.size();
+        l.way_listed.push_back(stays ? old.way_listed[o] : l.way_of(d.slave, d.master));
         if (stays) {
             l.node.insert(l.node.end(), old.node.begin() + old.start[o], old.node.begin() + old.start[o + 1]);
             l.clearance.insert(l.clearance.end(), old.clearance.begin() + old.start[o], old.clearance.begin() + old.start[o + 1]);

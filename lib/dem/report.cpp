@@ -211,7 +211,7 @@ void World::Impl::drop_contacts(Index body)
         }
     for (std::size_t p = 0; p < nodes.slave.size(); ++p)
         if (nodes.slave[p] == body || nodes.master[p] == body) nodes.count[p] = 0;
-    if (std::size_t(body) < nodes.x_listed.size()) nodes.x_listed[std::size_t(body)].setConstant(std::numeric_limits<double>::quiet_NaN());
+    if (std::size_t(body) < nodes.ways.size()) nodes.ways[std::size_t(body)].listed = -std::numeric_limits<double>::infinity();
 }
 
 }  // namespace coral::dem

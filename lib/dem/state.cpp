@@ -8,7 +8,7 @@ namespace coral::dem {
 
 namespace {
 
-constexpr std::uint64_t magic = 0x3530'4d45'4452'4f43;  // "CORDEM05"
+constexpr std::uint64_t magic = 0x3630'4d45'4452'4f43;  // "CORDEM06"
 constexpr std::uint64_t magic_name = 0x0000'ffff'ffff'ffff;  // the part without the version
 
 std::uint64_t checksum(std::span<const std::uint8_t> bytes)
@@ -79,8 +79,8 @@ void visit_state(World::Impl& m, Archive& io)
     SphereGridList& g = m.sphere_grids;
     io(g.sphere), io(g.grid), io(g.touch), io(g.slots), io(g.clearance), io(g.press), io(g.listed), io(g.facet_start), io(g.facet), io(g.out);
     NodeList& n = m.nodes;
-    io(n.slave), io(n.master), io(n.start), io(n.share), io(n.node), io(n.clearance), io(n.least), io(n.owed), io(n.first), io(n.count), io(n.out);
-    io(n.skin), io(n.x_listed), io(n.q_listed), io(n.wall_listed), io(n.drift), io(n.wall_drift);
+    io(n.slave), io(n.master), io(n.start), io(n.share), io(n.node), io(n.clearance), io(n.least), io(n.way_listed), io(n.owed), io(n.first), io(n.count), io(n.out);
+    io(n.skin), io(n.ways), io(n.wall_ways);
     n.contacts.resize((n.slave.size() + node_grain - 1) / node_grain);
     n.fresh.resize(n.contacts.size());
     for (std::vector<NodeContact>& block : n.contacts) io(block);

@@ -3,6 +3,7 @@
 /// The inside of a World: state as structure of arrays, neighbour lists, and the results of the contact loops.
 #include <chrono>
 #include <cstdint>
+#include <limits>
 #include <map>
 #include <span>
 #include <vector>
@@ -160,42 +161,60 @@ struct NodeContact {
     detail::CellMemory cell;
 };
 
+/// Share of the skin that a body may move before the lists are made anew: below one half, for trilinear distances may rise
+/// a little faster than the way.
+constexpr double free_path = 0.4;
+/// Lattices may rise a little faster than the way: what was farther away than this times the way is not there yet.
+constexpr double steepest = 1.25;
+/// Skin of the lists of nodes / that of the spheres; shortest hop of a way / that skin.
+constexpr double node_skin = 0.4, hop_share = 0.005;
+
+/// How far the points of a body (or wall) have come, counted in hops: a body hops when one of its points may be `hop` from where it was at
+/// the last hop. It grows only, and what a body that trembles in its place does is not counted. Between any two times
+///     |way of any point| <= length(t2) - length(t1) + 2 hop.
+struct Way {
+    Vec3 x = Vec3::Zero();        ///< of the body at the last hop
+    Quat q = Quat::Identity();
+    double length = 0.0;          ///< [m]
+    double listed = -std::numeric_limits<double>::infinity();  ///< length when its pairs were last looked at
+};
+
 /// Nodes of `slave` that are near `master` (a grid, or wall -1 - master). Pairs are in order; a pair without near nodes is listed as well,
 /// so that it is known to have been looked at.
 struct NodeList {
     std::vector<Index> slave, master, start;  ///< start has one more entry
     std::vector<double> share;                ///< 1, or 1/2 for the two directions of a pair
     std::vector<Index> node;                  ///< of a pair: ascending
-    std::vector<float> clearance;             ///< distance when it was listed, rounded down [m]
+    // A node that was last looked at with a clearance cannot touch before the ways of its bodies (see Way) have grown by as much.
+    std::vector<float> clearance;             ///< distance when it was last looked at + the way of the pair until then, rounded down [m]
     std::vector<float> least;                 ///< clearance of a pair; infinite without near nodes
+    std::vector<double> way_listed;           ///< of the pair, from which its way counts [m]
     std::vector<double> owed;                 ///< per pair: error of its work that waits for correction [J]
     std::vector<Index> first, count;          ///< contacts of a pair, within those of its block
     std::vector<std::vector<NodeContact>> contacts, fresh;  ///< per block; fresh is for the loop
     std::vector<GeneralForce> out;
     double skin = 0;                          ///< of these lists [m]
-    // Where bodies and walls were when the pairs they are in were last looked at, and how far their points have come since (or more).
-    std::vector<Vec3> x_listed, wall_listed;
-    std::vector<Quat> q_listed;
-    std::vector<double> drift, wall_drift;
+    std::vector<Way> ways, wall_ways;         ///< of bodies and walls
     std::span<const NodeContact> contacts_of(std::size_t pair) const;
     /// Springs for pairs of the list, as new contacts; others are ignored.
     void take_springs(std::vector<ContactSpring> springs);
-    double drift_of(Index master_or_wall) const
+    double way_of(Index body, Index partner) const
     {
-        return master_or_wall < 0 ? wall_drift[std::size_t(-1 - master_or_wall)] : drift[std::size_t(master_or_wall)];
+        return ways[std::size_t(body)].length + (partner < 0 ? wall_ways[std::size_t(-1 - partner)] : ways[std::size_t(partner)]).length;
     }
+    double hop() const { return hop_share * skin; }
+    /// By how much distances may have shrunk beside what the ways say.
+    double slack() const { return 4.0 * steepest * hop(); }
 };
-
-/// Share of the skin that a body may move before the lists are made anew: below one half, for trilinear distances may rise
-/// a little faster than the way.
-constexpr double free_path = 0.4;
-/// Lattices may rise a little faster than the way: what was farther away than this times the way is not there yet.
-constexpr double steepest = 1.25;
-/// Skin of the lists of nodes / that of the spheres.
-constexpr double node_skin = 0.4;
 
 // Large enough that a small world runs in one block, without threads.
 constexpr std::size_t body_grain = 1024, row_grain = 1024, entry_grain = 2048, grid_grain = 512, node_grain = 16;
+
+/// Angle between two orientations, or a little less [rad]: |q - q'| is half of it for small ones, and either sign of q is the same.
+inline double turn_between(const Quat& a, const Quat& b)
+{
+    return 2.0 * std::min((a.coeffs() - b.coeffs()).norm(), (a.coeffs() + b.coeffs()).norm());
+}
 
 /// Pair of the broad phase.
 struct BroadPair {
@@ -275,12 +294,24 @@ struct World::Impl {
     void make_blocks();
     const detail::Facets& facets_of(Index shape_id);
     void drop_contacts(Index body);
-    bool lists_expired() const;
+    bool lists_expired();
 
     // lists_nodes.cpp
     /// Lists the nodes of these pairs; those whose bodies have hardly moved keep theirs. Without pairs: of the present ones.
     void list_nodes(const std::vector<BroadPair>* pairs);
-    double drift_since_listed(std::size_t i) const;
+    /// Lets a body hop where it has come far enough. \return its way since its pairs were last looked at [m]
+    double note_way(std::size_t i)
+    {
+        Way& way = nodes.ways[i];
+        const double now = (x[i] - way.x).norm() + turn_between(q[i], way.q) * radius[i];
+        if (!(now <= nodes.hop())) {
+            way.length += now;
+            way.x = x[i];
+            way.q = q[i];
+        }
+        return way.length - way.listed;
+    }
+    double note_wall_way(std::size_t k);
 
     // contacts_*.cpp: forces at the present positions; springs advance by dt.
     void compute_contacts(double dt);
@@ -332,12 +363,6 @@ struct World::Impl {
 std::vector<BroadPair> broad_phase(const World::Impl& world, double skin);
 
 inline std::uint64_t key_of(Index a, Index b) { return std::uint64_t(std::uint32_t(a)) << 32 | std::uint32_t(b); }
-
-/// Angle between two orientations, or a little less [rad]: |q - q'| is half of it for small ones, and either sign of q is the same.
-inline double turn_between(const Quat& a, const Quat& b)
-{
-    return 2.0 * std::min((a.coeffs() - b.coeffs()).norm(), (a.coeffs() + b.coeffs()).norm());
-}
 
 inline double seconds_since(std::chrono::steady_clock::time_point start)
 {
