@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <numeric>
 #include <random>
+#include <span>
+#include <utility>
 
 #include "core/error.h"
 #include "core/parallel.h"
@@ -46,48 +48,61 @@ std::vector<Sample> sample_mesh(const TriangleMesh& mesh, const DistanceGrid& gr
     return samples;
 }
 
-/// Positions binned into cubes: lists of items in each bin by counting sort.
-class Bins {
+/// Cubes over a cloud of points, in rows.
+class Cubes {
 public:
-    Bins(std::span<const Eigen::Vector3d> points, double edge) : edge_(edge)
+    Cubes(std::span<const Eigen::Vector3d> points, double edge) : edge_(edge), lower_(points[0])
     {
-        lower_ = points[0];
         Eigen::Vector3d upper = points[0];
         for (const auto& p : points) lower_ = lower_.cwiseMin(p), upper = upper.cwiseMax(p);
         size_ = ((upper - lower_) / edge).array().floor().cast<int>() + 1;
-        start_.assign(std::size_t(size_.x()) * std::size_t(size_.y()) * std::size_t(size_.z()) + 1, 0);
-        for (const auto& p : points) ++start_[bin(cell(p)) + 1];
-        std::partial_sum(start_.begin(), start_.end(), start_.begin());
-        items_.resize(points.size());
-        std::vector<std::uint32_t> next(start_.begin(), start_.end() - 1);
-        for (std::size_t n = 0; n < points.size(); ++n) items_[next[bin(cell(points[n]))]++] = std::uint32_t(n);
     }
 
-    /// visit(item) for items in the bins within `rings` bins of the point, in bin order.
+    std::size_t count() const { return std::size_t(size_.x()) * std::size_t(size_.y()) * std::size_t(size_.z()); }
+    std::size_t at(const Eigen::Vector3d& p) const { return number(cell(p)); }
+    /// visit(number) for the cubes that a ball may meet, in order.
     template <class Visit>
-    void around(const Eigen::Vector3d& p, int rings, const Visit& visit) const
+    void around(const Eigen::Vector3d& p, double radius, const Visit& visit) const
     {
-        const Eigen::Vector3i c = cell(p);
-        const Eigen::Vector3i first = (c.array() - rings).max(0), last = (c.array() + rings).min(size_.array() - 1);
+        const Eigen::Vector3i first = cell(p.array() - radius).cwiseMax(0), last = cell(p.array() + radius).cwiseMin((size_.array() - 1).matrix());
         for (int k = first.z(); k <= last.z(); ++k)
             for (int j = first.y(); j <= last.y(); ++j)
-                for (int i = first.x(); i <= last.x(); ++i) {
-                    const std::size_t b = bin({i, j, k});
-                    for (std::uint32_t n = start_[b]; n < start_[b + 1]; ++n) visit(items_[n]);
-                }
+                for (int i = first.x(); i <= last.x(); ++i) visit(number({i, j, k}));
     }
-    double edge() const { return edge_; }
-    int widest() const { return size_.maxCoeff(); }
 
 private:
     Eigen::Vector3i cell(const Eigen::Vector3d& p) const { return ((p - lower_) / edge_).array().floor().cast<int>(); }
-    std::size_t bin(const Eigen::Vector3i& c) const
+    std::size_t number(const Eigen::Vector3i& c) const
     {
         return std::size_t(c.x()) + std::size_t(size_.x()) * (std::size_t(c.y()) + std::size_t(size_.y()) * std::size_t(c.z()));
     }
     double edge_;
     Eigen::Vector3d lower_;
     Eigen::Vector3i size_;
+};
+
+/// Points by cube: lists of them by counting sort.
+class Bins {
+public:
+    Bins(std::span<const Eigen::Vector3d> points, double edge) : cubes_(points, edge), start_(cubes_.count() + 1, 0), items_(points.size())
+    {
+        for (const auto& p : points) ++start_[cubes_.at(p) + 1];
+        std::partial_sum(start_.begin(), start_.end(), start_.begin());
+        std::vector<std::uint32_t> next(start_.begin(), start_.end() - 1);
+        for (std::size_t n = 0; n < points.size(); ++n) items_[next[cubes_.at(points[n])]++] = std::uint32_t(n);
+    }
+
+    /// visit(item) for items in the cubes that a ball may meet.
+    template <class Visit>
+    void around(const Eigen::Vector3d& p, double radius, const Visit& visit) const
+    {
+        cubes_.around(p, radius, [&](std::size_t cube) {
+            for (std::uint32_t n = start_[cube]; n < start_[cube + 1]; ++n) visit(items_[n]);
+        });
+    }
+
+private:
+    Cubes cubes_;
     std::vector<std::uint32_t> start_, items_;
 };
 
@@ -98,48 +113,56 @@ double separation(const Sample& a, const Eigen::Vector3d& position, const Eigen:
 }
 
 /// Dart throwing with a falling radius until `count` samples are taken.
-std::vector<std::size_t> seeds(const std::vector<Sample>& samples, const Bins& bins, std::size_t count, double spacing)
+std::vector<std::size_t> seeds(const std::vector<Sample>& samples, std::span<const Eigen::Vector3d> positions, std::size_t count, double spacing)
 {
+    constexpr std::uint32_t none = ~std::uint32_t{0};
     std::vector<std::size_t> order(samples.size()), chosen;
     std::iota(order.begin(), order.end(), std::size_t{0});
     std::mt19937_64 random(20240117);
     for (std::size_t n = order.size() - 1; n > 0; --n) std::swap(order[n], order[random() % (n + 1)]);
     std::vector<char> taken(samples.size(), 0);
+    // Samples are many, those taken few: only these are listed, by cube.
+    const Cubes cubes(positions, spacing);
+    std::vector<std::uint32_t> newest(cubes.count(), none), older(samples.size(), none);
     for (double radius = spacing; chosen.size() < count; radius = radius > 0.3 * spacing ? 0.92 * radius : 0.0)
         for (const std::size_t s : order) {
             if (chosen.size() == count) break;
             if (taken[s]) continue;
             bool free = true;
             const double wide = radius / std::sqrt(samples[s].density);
-            bins.around(samples[s].position, std::max(1, int(std::ceil(wide / spacing))), [&](std::uint32_t other) {
-                if (taken[other] && separation(samples[s], samples[other].position, samples[other].normal, spacing) < wide * wide) free = false;
+            cubes.around(positions[s], wide, [&](std::size_t cube) {
+                for (std::uint32_t other = newest[cube]; free && other != none; other = older[other])
+                    free = !(separation(samples[s], samples[other].position, samples[other].normal, spacing) < wide * wide);
             });
             if (!free) continue;
             taken[s] = 1;
+            std::uint32_t& head = newest[cubes.at(positions[s])];
+            older[s] = std::exchange(head, std::uint32_t(s));
             chosen.push_back(s);
         }
     return chosen;
 }
 
-/// Number of the nearest node of each sample.
-std::vector<std::uint32_t> assign(const std::vector<Sample>& samples, const SurfaceNodes& nodes, double spacing)
+/// Number of the nearest node of each sample; `owner` comes with a guess.
+void assign(const std::vector<Sample>& samples, const SurfaceNodes& nodes, double spacing, std::vector<std::uint32_t>& owner)
 {
-    const Bins bins(nodes.positions, 1.5 * spacing);
-    std::vector<std::uint32_t> owner(samples.size(), 0);
+    const Bins bins(nodes.positions, 0.75 * spacing);
     parallel_blocks(samples.size(), 1024, [&](std::size_t begin, std::size_t end) {
         for (std::size_t s = begin; s < end; ++s) {
-            double best = std::numeric_limits<double>::infinity();
-            for (int rings = 1;; rings *= 2) {
-                bins.around(samples[s].position, rings, [&](std::uint32_t n) {
-                    const double d2 = separation(samples[s], nodes.positions[n], nodes.normals[n], spacing);
-                    if (d2 < best || (d2 == best && n < owner[s])) best = d2, owner[s] = n;
-                });
-                const double searched = rings * bins.edge();  // nothing nearer than this was missed
-                if (best <= searched * searched || rings > bins.widest()) break;
-            }
+            std::uint32_t nearest = owner[s];
+            const auto distance2 = [&](std::uint32_t n) { return separation(samples[s], nodes.positions[n], nodes.normals[n], spacing); };
+            double best = distance2(nearest);
+            const auto look = [&](std::uint32_t n) {
+                const double d2 = distance2(n);
+                if (d2 < best || (d2 == best && n < nearest)) best = d2, nearest = n;
+            };
+            // Nearby first, which mostly shows that there is no need to look as far as a bad guess lies.
+            const double first = 0.75 * spacing, far = std::sqrt(best);
+            bins.around(samples[s].position, std::min(first, far), look);
+            if (far > first && best > first * first) bins.around(samples[s].position, std::sqrt(best), look);
+            owner[s] = nearest;
         }
     });
-    return owner;
 }
 
 void place(const DistanceGrid& grid, Eigen::Vector3d& position, Eigen::Vector3d& normal)
@@ -203,12 +226,16 @@ SurfaceNodes surface_nodes(const DistanceGrid& grid, int count, double ball)
     std::vector<Eigen::Vector3d> positions;
     for (const Sample& s : samples) positions.push_back(s.position);
     SurfaceNodes nodes;
-    for (const std::size_t s : seeds(samples, Bins(positions, spacing), n, spacing)) {
+    for (const std::size_t s : seeds(samples, positions, n, spacing)) {
         nodes.positions.push_back(samples[s].position);
         nodes.normals.push_back(samples[s].normal);
     }
-    for (int step = 0; step < 12; ++step) lloyd_step(samples, assign(samples, nodes, spacing), spacing, nodes);
-    const std::vector<std::uint32_t> owner = assign(samples, nodes, spacing);
+    std::vector<std::uint32_t> owner(samples.size(), 0);
+    for (int step = 0; step < 12; ++step) {
+        assign(samples, nodes, spacing, owner);
+        lloyd_step(samples, owner, spacing, nodes);
+    }
+    assign(samples, nodes, spacing, owner);
     nodes.areas.assign(n, 0.0);
     for (const std::uint32_t node : owner) nodes.areas[node] += 1.0;
     for (double& a : nodes.areas) a *= area / double(samples.size());
