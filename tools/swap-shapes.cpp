@@ -35,7 +35,7 @@ void declare(cli::Options& options, Options& o)
     options.add("--nodes", o.swap.fine_nodes, "Contact nodes on a fine grain with a new shape").between(100, 20000);
     options.flag("--drop-trapped", o.swap.drop_trapped, "Take out fines that a filled void covers; else they are moved to its surface");
     options.add("--limit", o.swap.limit, "Largest displacement of a coarse grain, and mean one of the fines, over the diameter").not_negative();
-    options.add("--overlap-limit", o.swap.overlap_limit, "Largest overlap that may stay, over the smaller diameter").not_negative();
+    options.add("--overlap-limit", o.swap.overlap_limit, "Largest overlap that may stay, over the smaller diameter; 0: twice the deepest of the sample, at least 5 %").not_negative();
     options.add("--figure", o.figure, "Picture of the sample, cut open, .png");
     options.flag("--restore-pressure", o.swap.restore_pressure, "Move the walls until each pair has the pressure it had");
     options.add("--steps", o.swap.max_steps, "Longest damped run [steps]").between(0, 10000000);

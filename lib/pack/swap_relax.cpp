@@ -16,6 +16,7 @@ constexpr double deep = 0.01;              ///< overlap / diameter that counts a
 constexpr double harmless_overlap = 1e-3;  ///< over the radius; what the sample had may be more
 constexpr int iterations_of_fines = 100, iterations_of_all = 300, rounds = 4;
 constexpr int steps_between_checks = 100;
+constexpr double least_overlap_limit = 0.05;  ///< over the diameter; a sample that is pressed harder may stay so
 constexpr double fastest_wall = 0.02;  ///< [m/s]
 constexpr double pressure_tolerance = 0.05;
 
@@ -234,9 +235,10 @@ void check(const dem::World& world, const Box& box, const SwapOptions& options, 
 {
     const std::string help = report.trapped.empty() || options.drop_trapped ? "take shapes nearer to the old ones (a higher --degree, more --faces), or raise the limit"
                                                                            : "add --drop-trapped, or take shapes nearer to the old ones";
-    if (report.after.largest > options.overlap_limit)
+    const double deepest = options.overlap_limit > 0 ? options.overlap_limit : std::max(least_overlap_limit, 2 * report.before.largest);
+    if (report.after.largest > deepest)
         throw Error("swap", "grains still overlap by " + percent(report.after.largest) + " of the smaller diameter after the relaxation (" +
-                                percent(report.swapped.largest) + " before it; --overlap-limit is " + percent(options.overlap_limit) + ")", help);
+                                percent(report.swapped.largest) + " before it; --overlap-limit is " + percent(deepest) + ")", help);
     if (report.coarse.largest > options.limit)
         throw Error("swap", "the skeleton does not hold: a coarse grain moved by " + percent(report.coarse.largest) + " of its diameter (--limit is " + percent(options.limit) + ")", help);
     if (report.fine.mean > options.limit)
