@@ -7,6 +7,7 @@
 #include "core/output_file.h"
 #include "core/text.h"
 #include "dem/polyhedron.h"
+#include "fluid/drag.h"
 
 namespace coral::suffusion {
 
@@ -292,14 +293,20 @@ void read_time_and_output(const ConfigTable& root, Case& result)
 void read_fluid(const ConfigTable& root, Case& result)
 {
     if (!root.has("fluid")) return;
-    static const Strings drags{"gidaspow"};
+    static const Strings disturbances{"removed", "volume-removed", "kept"};
     const ConfigTable fluid = root.table("fluid");
     FluidSpec spec;
     spec.density = positive(fluid, "density", Dimension::density, spec.density);
     spec.kinematic_viscosity = positive(fluid, "kinematic_viscosity", Dimension::kinematic_viscosity, spec.kinematic_viscosity);
     spec.body_acceleration = fluid.vector("body_acceleration", Dimension::acceleration, spec.body_acceleration);
     spec.initial_velocity = fluid.vector("initial_velocity", Dimension::velocity, spec.initial_velocity);
-    spec.drag = fluid.choice("drag", drags, "gidaspow");
+    spec.drag = fluid.choice("drag", fluid::drag_law_names(), "gidaspow");
+    spec.self_disturbance = fluid.choice("self_disturbance", disturbances, "removed");
+    const std::vector<double> support = fluid.quantities("kernel_support", Dimension::number, std::vector<double>{2, 4});
+    if (support.size() != 2 || !(support[0] >= 1 && support[1] >= support[0] && support[1] <= 12))
+        fluid.error("kernel_support", "is no pair of support diameters", "give [for the void fraction, for what a grain feels] in grain diameters, such as [2, 4]");
+    else
+        spec.kernel_support = {support[0], support[1]};
     result.fluid = spec;
     if (!root.has("domain")) root.error("domain", "is missing", "a case with [fluid] needs origin, size and cell");
 }

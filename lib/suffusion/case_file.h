@@ -41,7 +41,9 @@ struct FluidSpec {
     double kinematic_viscosity = 1e-6;  ///< [m2/s]
     Eigen::Vector3d body_acceleration = Eigen::Vector3d::Zero();  ///< on the fluid only [m/s2]
     Eigen::Vector3d initial_velocity = Eigen::Vector3d::Zero();   ///< [m/s]
-    std::string drag = "gidaspow";
+    std::string drag = "gidaspow";               ///< a name of fluid::drag_law_names()
+    std::string self_disturbance = "removed";    ///< removed | volume-removed | kept: fluid::SelfDisturbance
+    std::array<double, 2> kernel_support{2, 4};  ///< diameters of the volume and the felt kernel over that of the grain
 };
 
 struct MaterialSpec {

@@ -8,15 +8,33 @@ namespace coral::suffusion {
 
 using Eigen::Vector3d;
 
+namespace {
+
+fluid::KernelOptions kernel_options(const FluidSpec& spec)
+{
+    fluid::KernelOptions options;
+    options.volume_support = spec.kernel_support[0];
+    options.felt_support = spec.kernel_support[1];
+    options.self_disturbance = spec.self_disturbance == "removed"          ? fluid::SelfDisturbance::removed
+                               : spec.self_disturbance == "volume-removed" ? fluid::SelfDisturbance::volume_removed
+                                                                           : fluid::SelfDisturbance::kept;
+    return options;
+}
+
+}  // namespace
+
 Fines::Fines(const Scene& scene, const fluid::GridSpec& grid)
     : density_(scene.description.fluid->density), viscosity_(scene.description.fluid->kinematic_viscosity),
-      law_(fluid::drag_law_from_name(scene.description.fluid->drag)), corner_(grid.origin), kernel_(grid)
+      law_(fluid::drag_law_from_name(scene.description.fluid->drag)), corner_(grid.origin), kernel_(grid, kernel_options(*scene.description.fluid))
 {
     for (int axis = 0; axis < 3; ++axis)
         if (grid.periodic(axis)) period_[axis] = grid.size()[axis];
     for (std::size_t i = 0; i < scene.bodies.size(); ++i)
         if (scene.bodies[i].scheme != Scheme::resolved) all_.push_back(static_cast<int>(i));
     total_ = all_.size();
+    if (law_ == fluid::DragLaw::hoelzer_sommerfeld || law_ == fluid::DragLaw::ganser)
+        for (const int id : all_)
+            if (const int shape = scene.world.shape_id(id); !outlines_.contains(shape)) outlines_.emplace(shape, Outline(scene.world.shape(id)));
     forces_.assign(scene.bodies.size(), Vector3d::Zero());
     other_.assign(scene.bodies.size(), Vector3d::Zero());
 }
@@ -48,6 +66,13 @@ void Fines::collect(const Scene& scene)
     coefficients_.resize(ids_.size());
 }
 
+fluid::DragShape Fines::drag_shape(const Scene& scene, int id, const Vector3d& slip) const
+{
+    if (outlines_.empty()) return {};
+    const Vector3d along = slip.squaredNorm() > 0 ? slip : Vector3d::UnitZ().eval();
+    return outlines_.at(scene.world.shape_id(id)).along(scene.world.orientation(id).conjugate() * along);
+}
+
 void Fines::deposit(fluid::Flow& flow, double dt, const Scene& scene, const fluid::Field* cell_solid)
 {
     collect(scene);
@@ -57,7 +82,7 @@ void Fines::deposit(fluid::Flow& flow, double dt, const Scene& scene, const flui
     mean_felt_ = 0;
     for (std::size_t i = 0; i < ids_.size(); ++i) {
         const std::size_t id = static_cast<std::size_t>(ids_[i]);
-        const fluid::FineParticle particle{velocities_[i], diameters_[i], volumes_[i], {}};
+        const fluid::FineParticle particle{velocities_[i], diameters_[i], volumes_[i], drag_shape(scene, ids_[i], felt_[i].velocity - velocities_[i])};
         const fluid::FineForce now = fluid::fine_force(law_, particle, felt_[i], density_, viscosity_);
         // Force at the velocity the body will have: linear in it, so solved at once. Stable for any dt, exact at rest and at terminal speed.
         const bool moves = scene.world.motion(ids_[i]) == dem::Motion::free;

@@ -2,10 +2,12 @@
 /// \file suffusion/fines.h
 /// Semi-resolved and unresolved bodies in the flow: drag and pressure-gradient force on them, the same momentum taken from the fluid.
 #include <Eigen/Core>
+#include <map>
 #include <vector>
 
 #include "fluid/fine_force.h"
 #include "suffusion/scene.h"
+#include "suffusion/shapes.h"
 
 namespace coral::suffusion {
 
@@ -35,11 +37,14 @@ public:
 
 private:
     void collect(const Scene& scene);
+    /// Shape of a body as its drag law sees it along the slip; that of a sphere where the law does not ask.
+    fluid::DragShape drag_shape(const Scene& scene, int id, const Eigen::Vector3d& slip) const;
 
     double density_, viscosity_;
     fluid::DragLaw law_;
     Eigen::Vector3d period_ = Eigen::Vector3d::Zero(), corner_;
     fluid::FineCoupling kernel_;
+    std::map<int, Outline> outlines_;  ///< by shape of the world; empty where the drag law knows spheres only
     std::size_t total_ = 0;
     std::vector<int> all_, ids_;  ///< bodies of this kind; those that are in
     std::vector<Eigen::Vector3d> positions_, velocities_, drag_, lag_;

@@ -1,6 +1,9 @@
 #include "suffusion/shapes.h"
 
 #include <algorithm>
+#include <numbers>
+#include <numeric>
+#include <optional>
 #include <sstream>
 
 #include "core/error.h"
@@ -102,6 +105,51 @@ std::shared_ptr<const dem::Shape> polyhedron_shape(const BodySpec& body, const s
     return dem::Shape::polyhedron(file.filename().string(), dem::Polyhedron(points, file.string()));
 }
 
+/// Surface of a lattice shape on a lattice of about `across` cells over its diameter.
+sdf::TriangleMesh thinned_mesh(const dem::Shape& shape, double across)
+{
+    const sdf::DistanceGrid& fine = shape.distance_grid();
+    const int stride = std::max(1, static_cast<int>(std::lround(2 * shape.equivalent_radius() / (across * fine.spacing))));
+    sdf::DistanceGrid coarse;
+    coarse.spacing = stride * fine.spacing;
+    coarse.origin = fine.origin;
+    // One more node than fits: beyond the lattice all is outside.
+    coarse.size = (fine.size.array() - 1) / stride + 2;
+    for (int k = 0; k < coarse.size.z(); ++k)
+        for (int j = 0; j < coarse.size.y(); ++j)
+            for (int i = 0; i < coarse.size.x(); ++i) coarse.distance.push_back(static_cast<float>(fine.sample(coarse.node(i, j, k))));
+    return sdf::extract_mesh(coarse);
+}
+
+/// Greatest area of a closed surface of the mesh: the outside, where closed voids have walls of their own.
+double outer_area(const sdf::TriangleMesh& mesh)
+{
+    std::vector<int> root(mesh.vertices.size());
+    std::iota(root.begin(), root.end(), 0);
+    const auto find = [&](int v) {
+        while (root[std::size_t(v)] != v) v = root[std::size_t(v)] = root[std::size_t(root[std::size_t(v)])];
+        return v;
+    };
+    for (const Eigen::Vector3i& t : mesh.triangles)
+        for (int corner = 1; corner < 3; ++corner) root[std::size_t(find(t[corner]))] = find(t[0]);
+    std::vector<double> area(mesh.vertices.size(), 0.0);
+    for (const Eigen::Vector3i& t : mesh.triangles)
+        area[std::size_t(find(t[0]))] += sdf::triangle_area(mesh.vertices[std::size_t(t[0])], mesh.vertices[std::size_t(t[1])], mesh.vertices[std::size_t(t[2])]);
+    return *std::ranges::max_element(area);
+}
+
+/// Area along the outward normal.
+Eigen::Vector3d face_area(const dem::Polyhedron& body, std::size_t face)
+{
+    const std::vector<int>& corners = body.faces()[face];
+    Eigen::Vector3d area = Eigen::Vector3d::Zero();
+    for (std::size_t c = 2; c < corners.size(); ++c) {
+        const Eigen::Vector3d &a = body.vertices()[std::size_t(corners[0])], &b = body.vertices()[std::size_t(corners[c - 1])], &d = body.vertices()[std::size_t(corners[c])];
+        area += 0.5 * (b - a).cross(d - a);
+    }
+    return area;
+}
+
 }  // namespace
 
 std::string shape_key(const BodySpec& body)
@@ -137,20 +185,48 @@ Surface viewing_surface(const dem::Shape& shape)
         surface.polygons.assign(body.faces().begin(), body.faces().end());
     }
     if (shape.kind() != dem::ShapeKind::grid) return surface;
-    const sdf::DistanceGrid& fine = shape.distance_grid();
-    const int stride = std::max(1, static_cast<int>(std::lround(2 * shape.equivalent_radius() / (24 * fine.spacing))));
-    sdf::DistanceGrid coarse;
-    coarse.spacing = stride * fine.spacing;
-    coarse.origin = fine.origin;
-    // One more node than fits: beyond the lattice all is outside.
-    coarse.size = (fine.size.array() - 1) / stride + 2;
-    for (int k = 0; k < coarse.size.z(); ++k)
-        for (int j = 0; j < coarse.size.y(); ++j)
-            for (int i = 0; i < coarse.size.x(); ++i) coarse.distance.push_back(static_cast<float>(fine.sample(coarse.node(i, j, k))));
-    const sdf::TriangleMesh mesh = sdf::extract_mesh(coarse);
+    const sdf::TriangleMesh mesh = thinned_mesh(shape, 24);
     surface.vertices = mesh.vertices;
     for (const Eigen::Vector3i& t : mesh.triangles) surface.polygons.push_back({t[0], t[1], t[2]});
     return surface;
+}
+
+Outline::Outline(const dem::Shape& shape)
+{
+    if (shape.kind() == dem::ShapeKind::sphere) return;
+    const double radius = shape.equivalent_radius();
+    section_ = std::numbers::pi * radius * radius;
+    std::optional<dem::Polyhedron> hull;
+    double surface = 0;
+    if (shape.kind() == dem::ShapeKind::polyhedron) {
+        hull = shape.polyhedron();
+        surface = hull->surface();
+    } else {
+        const sdf::TriangleMesh mesh = thinned_mesh(shape, 40);
+        surface = outer_area(mesh);
+        hull.emplace(mesh.vertices, shape.name());
+    }
+    sphericity_ = std::min(4 * section_ / surface, 1.0);
+    for (std::size_t face = 0; face < hull->faces().size(); ++face) add_face(face_area(*hull, face));
+}
+
+/// Takes faces within about 4 degrees together: the cosine of half of that is 1 to 6e-4.
+void Outline::add_face(const Eigen::Vector3d& area)
+{
+    for (Eigen::Vector3d& known : areas_)
+        if (std::abs(known.dot(area)) > 0.9975 * known.norm() * area.norm()) {
+            known += known.dot(area) > 0 ? area : (-area).eval();
+            return;
+        }
+    areas_.push_back(area);
+}
+
+double Outline::crosswise_sphericity(const Eigen::Vector3d& direction) const
+{
+    if (areas_.empty()) return 1;
+    double seen = 0;
+    for (const Eigen::Vector3d& area : areas_) seen += std::abs(area.dot(direction));
+    return section_ * direction.norm() / (0.5 * seen);
 }
 
 }  // namespace coral::suffusion

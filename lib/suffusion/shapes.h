@@ -6,6 +6,7 @@
 #include <string>
 
 #include "dem/shape.h"
+#include "fluid/drag.h"
 #include "suffusion/case_file.h"
 
 namespace coral::suffusion {
@@ -27,5 +28,25 @@ struct Surface {
 /// The faces of a polyhedron; triangles of the lattice, thinned to about 24 cells across, of every other shape that is no sphere.
 /// For pictures only. Empty for spheres.
 Surface viewing_surface(const dem::Shape& shape);
+
+/// What drag laws ask of a shape. Sizes cancel: it serves bodies of any scale.
+class Outline {
+public:
+    /// The surface is that of the outermost closed surface of a lattice, walls of closed voids left out, or of the polyhedron; the
+    /// projection is that of the convex hull.
+    explicit Outline(const dem::Shape& shape);
+
+    double sphericity() const { return sphericity_; }  ///< surface of the sphere of the apparent volume over the surface, at most 1
+    /// Section of that sphere over the area seen along a direction of the shape frame (any length but zero): sum |a_f . n|/2 over the
+    /// faces of the hull.
+    double crosswise_sphericity(const Eigen::Vector3d& direction) const;
+    fluid::DragShape along(const Eigen::Vector3d& direction) const { return {sphericity_, crosswise_sphericity(direction)}; }
+
+private:
+    void add_face(const Eigen::Vector3d& area);
+
+    double sphericity_ = 1, section_ = 0;        ///< section of the sphere [m2]; 0 for a sphere
+    std::vector<Eigen::Vector3d> areas_;         ///< of the hull, faces that look alike or opposite taken together [m2]
+};
 
 }  // namespace coral::suffusion

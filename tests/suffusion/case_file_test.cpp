@@ -148,6 +148,25 @@ TEST(CaseFile, wants_periodic_faces_in_pairs_and_whole_cells)
     EXPECT_NE(error_of(replaced(whole, "\"64mm\"", "\"64.2mm\"")).find("whole number of cells"), std::string::npos);
 }
 
+TEST(CaseFile, reads_how_fines_feel_the_flow)
+{
+    const Scratch scratch;
+    scratch.write("case.toml", "[domain]\nsize = [1, 1, 1]\ncell = 0.1\n[fluid]\ndrag = \"hoelzer-sommerfeld\"\nself_disturbance = \"volume-removed\"\nkernel_support = [3, 6]\n[time]\nduration = 1\n");
+    const Case c = read_case(scratch.path());
+    EXPECT_EQ(c.fluid->drag, "hoelzer-sommerfeld");
+    EXPECT_EQ(c.fluid->self_disturbance, "volume-removed");
+    EXPECT_EQ(c.fluid->kernel_support[1], 6.0);
+    scratch.write("case.toml", "[domain]\nsize = [1, 1, 1]\ncell = 0.1\n[fluid]\ndrag = \"di-felise\"\nself_disturbance = \"gone\"\nkernel_support = [4, 2]\n[time]\nduration = 1\n");
+    try {
+        read_case(scratch.path());
+        FAIL() << "three bad values went through";
+    } catch (const UsageError& error) {
+        const std::string text = error.what();
+        for (const char* part : {"case.toml:5:", "di-felice", "case.toml:6:", "volume-removed", "case.toml:7:", "is no pair of support diameters"})
+            EXPECT_NE(text.find(part), std::string::npos) << part << "\n" << text;
+    }
+}
+
 TEST(CaseFile, tells_that_a_case_is_missing)
 {
     try {
