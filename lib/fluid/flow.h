@@ -200,6 +200,7 @@ private:
     void build_volume_flux();
     void solve_increment(double dt);
     void correct(double dt);
+    void relax_pressure(double part);
     double correct_row(int axis, const detail::FaceRange& range, int j, int k, double factor);
     void diagnose();
     void balance_sides();
