@@ -32,8 +32,9 @@ struct SolidSet {
 inline constexpr int cells_component = 3;
 
 /// Control volumes of component 0..2 (faces the flow advances) or of the cells (3) that the body at `motion` covers.
-/// phi = sum max(-d, 0) / sum |d| over the eight corners [Huang et al., section 2.3.2, on each staggered volume].
+/// phi = sum max(-d, 0) / sum |d| over the eight corners [Huang et al., section 2.3.2, on each staggered volume], the
+/// distances lowered for the curvature of the surface unless `rule` is the paper's  [docs/numerics.md, eq. 9].
 SolidSet find_solid(const GridSpec& grid, const Layout& layout, int component, const BodyShape& shape,
-                    const RigidMotion& motion);
+                    const RigidMotion& motion, FractionRule rule);
 
 }  // namespace coral::fluid::detail
