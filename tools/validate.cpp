@@ -134,7 +134,14 @@ const std::vector<Study> studies{{"cubic-arrays", coral::validate::cubic_arrays}
                                  {"array-positions", coral::validate::array_positions},
                                  {"array-time-step", coral::validate::array_time_step},
                                  {"centred-arrays", coral::validate::centred_arrays},
-                                 {"ten-cate", coral::validate::ten_cate_tank}};
+                                 {"random-bed", coral::validate::random_bed},
+                                 {"fixed-sphere", coral::validate::fixed_sphere},
+                                 {"rotating-sphere", coral::validate::rotating_sphere},
+                                 {"closed-shell", coral::validate::closed_shell},
+                                 {"ten-cate", coral::validate::ten_cate_tank},
+                                 {"rising-sphere", coral::validate::rising_sphere},
+                                 {"two-spheres", coral::validate::two_spheres},
+                                 {"coral-grain", coral::validate::coral_grain}};
 
 void declare(coral::cli::Options& options, Options& o)
 {
