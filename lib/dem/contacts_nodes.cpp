@@ -33,7 +33,7 @@ struct Field {
             gradient = wall->normal;
             return wall->normal.dot(p - wall->point);
         }
-        return wall->plate.distance_and_gradient(p, gradient);
+        return wall->distance_and_gradient(p, gradient);
     }
 };
 
@@ -101,6 +101,7 @@ public:
             const WallData& wall = world.walls[std::size_t(-1 - master)];
             field_.wall = &wall;
             velocity_b_ = end_b_ = wall.velocity;
+            inverse_radius *= wall.relative_curvature(world.equivalent[a]);
             material_b = wall.material;
         }
         smaller_ = std::min(world.equivalent[a], reach_b);

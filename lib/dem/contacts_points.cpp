@@ -126,6 +126,14 @@ void open_contact(const Opening& o, PointMemory& memory, std::uint8_t& touch, bo
     touch = 0;
 }
 
+/// Overlap with a wall at the start of a step that went `way`, from what it is at the end.
+double overlap_before(const WallData& wall, const Vec3& x, const Vec3& way, const Vec3& normal, double overlap)
+{
+    if (wall.kind != WallData::Kind::cylinder) return overlap + way.dot(normal);
+    Vec3 gradient;
+    return overlap + wall.distance_and_gradient(x, gradient) - wall.distance_and_gradient(x - way, gradient);
+}
+
 }  // namespace
 
 void World::Impl::sphere_loop(double dt)
@@ -230,7 +238,8 @@ void World::Impl::sphere_wall_loop(double dt)
             double distance = 0.0;
             bool facing = true;
             if (wall.kind == WallData::Kind::plane) distance = n.dot(x[i] - wall.point);
-            else facing = wall.plate.feature(l.feature[k], x[i], distance, n);
+            else if (wall.kind == WallData::Kind::plate) facing = wall.plate.feature(l.feature[k], x[i], distance, n);
+            else distance = wall.distance_and_gradient(x[i], n);
             const double overlap = facing ? radius[i] - distance : -1.0;
             if (overlap > 0.0) {
                 l.near[touching] = Index(k);
@@ -273,9 +282,9 @@ void World::Impl::sphere_wall_loop(double dt)
             const PointResult r = detail::point_law(g, options.overlap_cap, dt);
             for (int k = 0; k < m.count; ++k)
                 if (l.touch[m.entry[k]] == 0 && dt > 0.0) {
-                    const Vec3 n = detail::lane(g.normal, k);
-                    detail::add_crossing(crossing, m.a[k], -1 - m.b[k], *m.law[k], g.overlap[k] + dt * detail::lane(g.relative, k).dot(n), g.overlap[k],
-                                         g.approach[k], g.root_mass[k], dt, n, s);
+                    const Vec3 n = detail::lane(g.normal, k), way = dt * detail::lane(g.relative, k);
+                    const double past = overlap_before(walls[std::size_t(m.b[k])], x[std::size_t(m.a[k])], way, n, g.overlap[k]);
+                    detail::add_crossing(crossing, m.a[k], -1 - m.b[k], *m.law[k], past, g.overlap[k], g.approach[k], g.root_mass[k], dt, n, s);
                 }
             put_back(m, g, r, [](Index b) { return -1 - b; }, l.memory, l.touch, out);
             sums_of_lanes.add(m, g, r, options.overlap_cap);

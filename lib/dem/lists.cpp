@@ -56,10 +56,10 @@ void make_sphere_wall_list(World::Impl& world, double skin)
         for (std::size_t wall = 0; wall < world.walls.size(); ++wall) {
             const WallData& data = world.walls[wall];
             Vec3 gradient;
-            const bool plane = data.kind == WallData::Kind::plane;
-            const double distance = plane ? data.normal.dot(world.x[i] - data.point) : data.plate.distance_and_gradient(world.x[i], gradient);
+            const bool plane = data.kind == WallData::Kind::plane, plate = data.kind == WallData::Kind::plate;
+            const double distance = plane ? data.normal.dot(world.x[i] - data.point) : data.distance_and_gradient(world.x[i], gradient);
             if (distance >= world.radius[i] + skin) continue;
-            for (int feature = 0; feature < (plane ? 1 : detail::Plate::features); ++feature) {
+            for (int feature = 0; feature < (plate ? detail::Plate::features : 1); ++feature) {
                 l.body.push_back(Index(i));
                 l.wall.push_back(Index(wall));
                 l.feature.push_back(std::uint8_t(feature));

@@ -33,7 +33,7 @@ std::vector<Directed> direct(const World::Impl& world, const std::vector<BroadPa
         for (std::size_t wall = 0; wall < world.walls.size(); ++wall) {
             const WallData& data = world.walls[wall];
             const double height = data.kind == WallData::Kind::plane ? data.normal.dot(world.x[i] - data.point)
-                                                                     : data.plate.distance_and_gradient(world.x[i], gradient);
+                                                                     : data.distance_and_gradient(world.x[i], gradient);
             if (height < world.radius[i] + world.skin) directed.push_back({Index(i), -1 - Index(wall), 1.0});
         }
     }
@@ -83,7 +83,7 @@ void look_at(const World::Impl& world, const Directed& d, NodeList& l)
         append_nodes(world, d.slave, [&](const Vec3& arm) { return height + wall.normal.dot(arm); }, l);
     } else {
         Vec3 gradient;
-        append_nodes(world, d.slave, [&](const Vec3& arm) { return wall.plate.distance_and_gradient(world.x[a] + arm, gradient); }, l);
+        append_nodes(world, d.slave, [&](const Vec3& arm) { return wall.distance_and_gradient(world.x[a] + arm, gradient); }, l);
     }
 }
 

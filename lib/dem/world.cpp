@@ -245,6 +245,23 @@ int World::add_plate(double top, double thickness, double hole, double pitch, co
     return int(m.walls.size()) - 1;
 }
 
+int World::add_cylinder(const Eigen::Vector2d& centre, double radius, int material)
+{
+    Impl& m = *impl_;
+    const std::string where = "cylinder (wall " + std::to_string(m.walls.size()) + ")";
+    if (material < 0 || std::size_t(material) >= m.materials.size()) throw Error(where, "has no material " + std::to_string(material), "add the material first");
+    if (!centre.allFinite()) throw Error(where, "its axis is no number", "give finite numbers");
+    if (!(radius > 0.0) || !std::isfinite(radius)) throw Error(where, "radius " + to_text(radius) + " m is not positive", "give a radius");
+    WallData wall;
+    wall.kind = WallData::Kind::cylinder;
+    wall.point = {centre.x(), centre.y(), 0.0};
+    wall.radius = radius;
+    wall.material = material;
+    m.walls.push_back(wall);
+    m.lists_valid = m.forces_valid = false;
+    return int(m.walls.size()) - 1;
+}
+
 // ---- Bodies ----
 
 namespace {
@@ -347,7 +364,7 @@ int World::wall_count() const { return int(impl_->walls.size()); }
 void World::set_wall_velocity(int wall, const Vec3& velocity)
 {
     WallData& data = impl_->walls[at(wall)];
-    if (data.kind != WallData::Kind::plane && !velocity.isZero(0.0)) throw Error("wall " + std::to_string(wall), "is a plate and does not move", "move planes only");
+    if (data.kind != WallData::Kind::plane && !velocity.isZero(0.0)) throw Error("wall " + std::to_string(wall), std::string("is a ") + (data.kind == WallData::Kind::plate ? "plate" : "cylinder") + " and does not move", "move planes only");
     data.velocity = velocity;
 }
 const Vec3& World::wall_velocity(int wall) const { return impl_->walls[at(wall)].velocity; }
@@ -356,6 +373,7 @@ Vec3 World::wall_normal(int wall) const { return impl_->walls[at(wall)].normal; 
 const Vec3& World::wall_force(int wall) const { return impl_->walls[at(wall)].force; }
 void World::set_gravity(const Vec3& gravity) { impl_->options.gravity = gravity; }
 const Vec3& World::gravity() const { return impl_->options.gravity; }
+const Vec3& World::period() const { return impl_->options.period; }
 void World::set_friction(int material, double friction)
 {
     impl_->materials[at(material)].friction = friction;

@@ -63,6 +63,10 @@ public:
     /// Unlimited horizontal plate with square holes: solid for top - thickness <= z <= top, except holes of edge `hole` centred at
     /// `hole_centre` + (i, j) pitch. hole = 0 is a plate without holes. \throws Error  hole not below pitch, thickness not positive
     int add_plate(double top, double thickness, double hole, double pitch, const Eigen::Vector2d& hole_centre, int material = 0);
+    /// Vertical cylinder of radius R with the bodies inside, unlimited along z: distance R - |x - centre| across. It stands still.
+    /// Nodes press with kn/(2 pi R*) per area, 1/R* = sqrt(1/r (1/r - 1/R)) for a body of equivalent radius r, so that a ball of nodes is as
+    /// stiff as a sphere. \throws Error  radius not positive
+    int add_cylinder(const Eigen::Vector2d& centre, double radius, int material = 0);
     ///@}
 
     /// \name Bodies
@@ -108,16 +112,17 @@ public:
     /// \name Walls
     ///@{
     int wall_count() const;
-    /// Planes only; the plate stays. [m/s]
+    /// Planes only; plates and cylinders stay. [m/s]
     void set_wall_velocity(int wall, const Eigen::Vector3d& velocity);
     const Eigen::Vector3d& wall_velocity(int wall) const;
-    Eigen::Vector3d wall_point(int wall) const;   ///< of a plane [m]
-    Eigen::Vector3d wall_normal(int wall) const;  ///< of a plane
+    Eigen::Vector3d wall_point(int wall) const;   ///< of a plane; of a cylinder, on its axis at z = 0 [m]
+    Eigen::Vector3d wall_normal(int wall) const;  ///< of a plane; of a cylinder, its axis
     const Eigen::Vector3d& wall_force(int wall) const;  ///< of the bodies on the wall, last step [N]
     ///@}
 
     void set_gravity(const Eigen::Vector3d& gravity);
     const Eigen::Vector3d& gravity() const;
+    const Eigen::Vector3d& period() const;  ///< lengths of WorldOptions::period [m]
     void set_friction(int material, double friction);
     const Material& material(int id) const;
 

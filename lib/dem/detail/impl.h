@@ -1,7 +1,9 @@
 #pragma once
 /// \file dem/detail/impl.h
 /// The inside of a World: state as structure of arrays, neighbour lists, and the results of the contact loops.
+#include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <map>
@@ -23,11 +25,31 @@ using Quat = Eigen::Quaterniond;
 using Index = std::int32_t;
 
 struct WallData {
-    enum class Kind : std::uint8_t { plane, plate } kind = Kind::plane;
+    enum class Kind : std::uint8_t { plane, plate, cylinder } kind = Kind::plane;
     Vec3 point = Vec3::Zero(), normal = Vec3::UnitZ(), velocity = Vec3::Zero(), force = Vec3::Zero();
     Vec3 reference = Vec3::Zero();  ///< point when the lists were made
     detail::Plate plate;
+    double radius = 0;  ///< of a cylinder about the vertical through `point`
     int material = 0;
+
+    /// Distance to the wall, positive where bodies belong, and its gradient.
+    double distance_and_gradient(const Vec3& p, Vec3& gradient) const
+    {
+        if (kind == Kind::plate) return plate.distance_and_gradient(p, gradient);
+        if (kind == Kind::plane) {
+            gradient = normal;
+            return normal.dot(p - point);
+        }
+        const Eigen::Vector2d across = p.head<2>() - point.head<2>();
+        const double off_axis = across.norm();
+        if (off_axis > 0.0) gradient << -across / off_axis, 0.0;
+        else gradient = -Vec3::UnitX();
+        return radius - off_axis;
+    }
+    /// Geometric mean of the two principal curvatures between a ball of radius r and the wall, over 1/r: sqrt(1 - r/R) in a cylinder of radius R.
+    /// The area of contact grows by its inverse, so this keeps the stiffness of nodes at kn. Bodies that are long for their volume may
+    /// have r near R or above it; they touch as if r were 3/4 R.
+    double relative_curvature(double r) const { return kind == Kind::cylinder ? std::sqrt(1.0 - std::min(r / radius, 0.75)) : 1.0; }
 };
 
 /// One-point contact of a sphere with a sphere or a wall, as the loops leave it for summation and reports.
