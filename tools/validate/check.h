@@ -51,4 +51,12 @@ std::vector<Check> two_spheres(const StudyOptions& options);
 std::vector<Check> coral_grain(const StudyOptions& options);
 ///@}
 
+/// \name Fines through the kernel (tools/validate/fines.cpp). Each returns its rows, coarse to fine.
+///@{
+std::vector<Check> falling_fine(const StudyOptions& options);  ///< alone in still water
+std::vector<Check> ergun_bed(const StudyOptions& options);     ///< periodic bed
+std::vector<Check> ergun_walls(const StudyOptions& options);   ///< the paper's bed in its box
+std::vector<Check> two_schemes(const StudyOptions& options);   ///< one sphere resolved and through the kernel
+///@}
+
 }  // namespace coral::validate
