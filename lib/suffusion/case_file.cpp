@@ -277,6 +277,9 @@ void read_time_and_output(const ConfigTable& root, Case& result)
     result.output.interval = positive(output, "interval", Dimension::time, std::max(result.time.duration / 100, 1e-12));
     result.output.frames = time_or_word(output, "frames", "none", 0);
     result.output.checkpoint = positive(output, "checkpoint", Dimension::time, result.output.checkpoint);
+    const std::int64_t layers = output.integer("layers", result.output.layers);
+    if (layers < 1 || layers > 100) output.error("layers", "is " + std::to_string(layers), "give a whole number from 1 to 100");
+    else result.output.layers = static_cast<int>(layers);
     if (!output.has("track")) return;
     if (output.is_string("track")) {
         static const Strings words{"all", "none"};

@@ -100,6 +100,7 @@ struct OutputSpec {
     double interval = 0;          ///< series [s]
     double frames = 0;            ///< fields and bodies for viewing [s]; 0 is none
     double checkpoint = 60;       ///< wall time between checkpoints [s]
+    int layers = 3;                 ///< of equal height, in which fines are counted
     bool track_all = true;
     std::vector<std::size_t> track;  ///< body numbers in file order, sample first
 };

@@ -6,6 +6,7 @@
 
 #include "core/error.h"
 #include "suffusion/frames.h"
+#include "suffusion/slices.h"
 
 namespace coral::suffusion {
 
@@ -13,6 +14,8 @@ namespace fs = std::filesystem;
 using Eigen::Vector3d;
 
 namespace {
+
+constexpr int slice_pixels = 600;
 
 std::string file_name(const char* kind, std::size_t number, const char* extension) { return fmt::format("{}_{:05}.{}", kind, number, extension); }
 
@@ -27,6 +30,10 @@ FrameWriter::FrameWriter(const Simulation& simulation)
     : interval_(simulation.scene().description.output.frames), duration_(simulation.scene().description.time.duration)
 {
     if (!(interval_ > 0)) return;
+    if (simulation.has_flow()) {
+        slice_row_ = slice_row(simulation);
+        regions_.emplace(simulation.scene());
+    }
     const dem::World& world = simulation.scene().world;
     for (int body = 0; body < world.body_count(); ++body) {
         const std::size_t shape = static_cast<std::size_t>(world.shape_id(body));
@@ -43,7 +50,7 @@ void FrameWriter::clear() const
     std::vector<fs::path> old;
     for (const fs::directory_entry& entry : fs::directory_iterator(folder_, ignored)) {
         const std::string extension = entry.path().extension().string(), name = entry.path().filename().string();
-        if ((extension == ".vti" || extension == ".vtu" || extension == ".pvd") && (name.starts_with("fluid") || name.starts_with("bodies") || name.starts_with("surfaces"))) old.push_back(entry.path());
+        if ((extension == ".vti" || extension == ".vtu" || extension == ".pvd" || extension == ".png") && (name.starts_with("fluid") || name.starts_with("slice") || name.starts_with("bodies") || name.starts_with("surfaces"))) old.push_back(entry.path());
     }
     for (const fs::path& file : old) fs::remove(file, ignored);
 }
@@ -122,11 +129,12 @@ void FrameWriter::write(const Simulation& simulation)
     if (failed) throw Error(folder_.string(), "cannot be made: " + failed.message(), "choose a folder that can be written");
     const std::size_t number = times_.size();
     times_.push_back(simulation.time());
-    std::vector<std::string> bodies, surfaces, fluids;
+    std::vector<std::string> bodies, surfaces, fluids, slices;
     for (std::size_t i = 0; i < times_.size(); ++i) {
         bodies.push_back(file_name("bodies", i, "vtu"));
         surfaces.push_back(file_name("surfaces", i, "vtu"));
         fluids.push_back(file_name("fluid", i, "vti"));
+        slices.push_back(file_name("slice", i, "vti"));
     }
     if (!simulation.scene().bodies.empty()) {
         write_bodies(simulation, bodies[number]);
@@ -139,6 +147,9 @@ void FrameWriter::write(const Simulation& simulation)
     if (!simulation.has_flow()) return;
     write_fluid(simulation, fluids[number]);
     write_collection(folder_ / "fluid.pvd", times_, fluids);
+    write_slice(folder_ / slices[number], simulation, *regions_, slice_row_);
+    pack::write_png(draw_slice(simulation, slice_row_, slice_pixels), folder_ / file_name("slice", number, "png"));
+    write_collection(folder_ / "slice.pvd", times_, slices);
 }
 
 }  // namespace coral::suffusion

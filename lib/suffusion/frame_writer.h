@@ -1,11 +1,13 @@
 #pragma once
 /// \file suffusion/frame_writer.h
-/// The frames of a run: frames/fluid_<n>.vti, frames/bodies_<n>.vtu (points), frames/surfaces_<n>.vtu (bodies that are no spheres), and
-/// fluid.pvd, bodies.pvd, surfaces.pvd with their times.
+/// The frames of a run: frames/fluid_<n>.vti, frames/bodies_<n>.vtu (points), frames/surfaces_<n>.vtu (bodies that are no spheres),
+/// frames/slice_<n>.vti and .png (one slice of the flow), and fluid.pvd, bodies.pvd, surfaces.pvd, slice.pvd with their times.
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "suffusion/flow_region.h"
 #include "suffusion/shapes.h"
 #include "suffusion/simulation.h"
 
@@ -32,6 +34,8 @@ private:
     double interval_, duration_;
     std::vector<Surface> surfaces_;  ///< by shape of the world
     bool any_surface_ = false;
+    int slice_row_ = 0;  ///< the same in all frames
+    std::optional<RegionFinder> regions_;  ///< with flow
     std::vector<double> times_;
 };
 

@@ -7,6 +7,8 @@
 #include "core/error.h"
 #include "core/parallel.h"
 #include "suffusion/bytes.h"
+#include "suffusion/fabric.h"
+#include "suffusion/flow_region.h"
 
 namespace coral::suffusion {
 
@@ -18,8 +20,8 @@ struct TrajectoryPart {
     const char *name, *unit;
     std::size_t width;
 };
-constexpr std::array<TrajectoryPart, 8> trajectory_parts{{{"position", "m", 3}, {"speed", "m s-1", 1}, {"velocity", "m s-1", 3}, {"orientation", "1", 4},
-                                                          {"angular_velocity", "rad s-1", 3}, {"fluid_force", "N", 3}, {"fluid_torque", "N m", 3}, {"contact_force", "N", 3}}};
+constexpr std::array<TrajectoryPart, 9> trajectory_parts{{{"position", "m", 3}, {"speed", "m s-1", 1}, {"velocity", "m s-1", 3}, {"orientation", "1", 4},
+                                                          {"angular_velocity", "rad s-1", 3}, {"fluid_force", "N", 3}, {"fluid_torque", "N m", 3}, {"contact_force", "N", 3}, {"state", "1", 1}}};
 
 constexpr double standard_gravity = 9.81;  ///< [m/s2], for the hydraulic gradient where the case has no gravity
 
@@ -45,37 +47,35 @@ double plane_pressure(const Simulation& simulation, int axis, int plane)
     return weight > 0 ? sum / weight : 0;
 }
 
-/// sqrt(3/2 a:a) with a = 15/2 (F - I/3), F the mean of n n^T: 0 for an even spread of contact normals.
-double anisotropy(const Eigen::Matrix3d& sum, double count)
-{
-    if (count == 0) return 0;
-    const Eigen::Matrix3d a = 7.5 * (sum / count - Eigen::Matrix3d::Identity() / 3);
-    return std::sqrt(1.5 * a.squaredNorm());
-}
-
 }  // namespace
 
 Observer::Observer(const Simulation& simulation)
 {
     const Scene& scene = simulation.scene();
     const Case& c = scene.description;
-    const double height = scene.upper.z() - scene.lower.z();
+    layers_ = static_cast<std::size_t>(c.output.layers);
+    bottom_ = scene.lower.z();
+    height_ = scene.upper.z() - scene.lower.z();
     for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
         if (c.output.track_all || std::ranges::find(c.output.track, i) != c.output.track.end()) results_.tracked.push_back(static_cast<std::int64_t>(i));
         if (!scene.bodies[i].fine) continue;
         initial_fine_mass_ += scene.bodies[i].mass;
         const Vector3d& x = scene.world.position(static_cast<int>(i));
         results_.fines.push_back(static_cast<std::int64_t>(i));
-        results_.layer.push_back(height > 0 ? std::clamp(static_cast<int>(3 * (x.z() - scene.lower.z()) / height), 0, 2) : 0);
+        results_.layer.push_back(static_cast<std::int64_t>(layer_of(x.z())));
         start_.push_back(x);
     }
     last_ = start_;
     results_.path_length.assign(start_.size(), 0);
     results_.net_displacement.assign(start_.size(), 0);
     results_.eroded.assign(start_.size(), 0);
+    results_.state.assign(start_.size(), 0);
+    results_.cloggings.assign(start_.size(), 0);
+    motion_.resize(start_.size());
     results_.case_text = c.text;
     if (!simulation.has_flow()) return;
 
+    regions_.emplace(scene);
     axis_ = c.flow_axis();
     const DomainSpec& domain = *c.domain;
     direction_ = c.fluid->body_acceleration[axis_] != 0 ? std::copysign(1.0, c.fluid->body_acceleration[axis_]) : -1;
@@ -88,18 +88,26 @@ Observer::Observer(const Simulation& simulation)
     reference_length_ = (upper_plane_ - lower_plane_) * domain.cell;
 }
 
-void Observer::put(const char* name, const char* unit, std::initializer_list<double> values)
+std::size_t Observer::layer_of(double z) const
+{
+    if (!(height_ > 0)) return 0;
+    const double layer = std::floor(static_cast<double>(layers_) * (z - bottom_) / height_);
+    return static_cast<std::size_t>(std::clamp(layer, 0.0, static_cast<double>(layers_ - 1)));
+}
+
+void Observer::put(const char* name, const char* unit, std::span<const double> values)
 {
     Column& column = results_.column(name);
     column.unit = unit;
     column.width = values.size();
-    column.values.insert(column.values.end(), values);
+    column.values.insert(column.values.end(), values.begin(), values.end());
 }
 
 void Observer::record(Simulation& simulation)
 {
     put("time", "s", simulation.time());
     record_erosion(simulation);
+    record_trapping(simulation);
     if (simulation.has_flow()) {
         record_flow(simulation);
         record_flow_split(simulation);
@@ -109,40 +117,40 @@ void Observer::record(Simulation& simulation)
     const Balance balance = simulation.take_balance();
     put("mass_balance_error", "1", balance.mass);
     put("momentum_balance_error", "1", balance.momentum);
+    record_migration(simulation);  // first: the trajectories hold the states
     record_trajectories(simulation);
-    record_migration(simulation);
+    last_time_ = simulation.time();
 }
 
 void Observer::record_erosion(const Simulation& simulation)
 {
     const Scene& scene = simulation.scene();
-    double mass = 0, count = 0, trapped = 0;
-    std::array<double, 3> layers{};
-    const double height = scene.upper.z() - scene.lower.z();
+    double mass = 0, count = 0;
+    std::vector<double> layers(layers_, 0.0);
     for (const std::int64_t id : results_.fines) {
         const std::size_t i = static_cast<std::size_t>(id);
         if (simulation.eroded(i)) {
             mass += scene.bodies[i].mass;
             count += 1;
-            continue;
-        }
-        const Vector3d& x = scene.world.position(static_cast<int>(i));
-        layers[static_cast<std::size_t>(height > 0 ? std::clamp(static_cast<int>(std::floor(3 * (x.z() - scene.lower.z()) / height)), 0, 2) : 0)] += 1;
-        for (std::size_t g = 0; g < scene.bodies.size(); ++g) {
-            const BodyInfo& grain = scene.bodies[g];
-            const int body = static_cast<int>(g);
-            if (!grain.apparent || !scene.world.active(body)) continue;
-            const Vector3d r = x - scene.world.position(body);
-            if (r.squaredNorm() > std::pow(scene.world.bounding_radius(body), 2)) continue;
-            if (!grain.apparent->contains(scene.world.orientation(body).conjugate() * r / scene.world.scale(body))) continue;
-            trapped += 1;
-            break;
+        } else {
+            layers[layer_of(scene.world.position(static_cast<int>(i)).z())] += 1;
         }
     }
     put("eroded_mass_fraction", "1", initial_fine_mass_ > 0 ? mass / initial_fine_mass_ : 0);
     put("eroded_count", "1", count);
-    put("fines_count", "1", {layers[0], layers[1], layers[2]});
-    put("trapped_count", "1", trapped);
+    put("fines_count", "1", layers);
+}
+
+void Observer::record_trapping(const Simulation& simulation)
+{
+    std::vector<std::int64_t> here;
+    for (const std::int64_t id : results_.fines)
+        if (!simulation.eroded(static_cast<std::size_t>(id))) here.push_back(id);
+    trapped_ = find_trapped(simulation.scene(), here, simulation.time(), trapped_);
+    put("trapped_count", "1", static_cast<double>(trapped_.size()));
+    put("trapped_enclosed", "1", static_cast<double>(std::ranges::count(trapped_, true, &Trapped::enclosed)));
+    put("trapped_entered", "1", static_cast<double>(std::ranges::count_if(trapped_, [](const Trapped& t) { return t.since > 0; })));
+    results_.trapped = trapped_;
 }
 
 void Observer::record_flow(const Simulation& simulation)
@@ -158,7 +166,7 @@ void Observer::record_flow(const Simulation& simulation)
     const double flux = direction_ * mean[axis_];
     put("hydraulic_gradient", "1", gradient);
     put("hydraulic_conductivity", "m s-1", gradient != 0 ? flux / gradient : 0);
-    put("mean_velocity", "m s-1", {mean.x(), mean.y(), mean.z()});
+    put("mean_velocity", "m s-1", std::span(mean.data(), 3));
     double inlet = 0, outlet = 0;
     bool has_inlet = false, has_outlet = false;
     for (int face = 0; face < 6; ++face) {
@@ -178,43 +186,30 @@ void Observer::record_flow_split(const Simulation& simulation)
     const Scene& scene = simulation.scene();
     const DomainSpec& domain = *scene.description.domain;
     const Eigen::Vector3i& cells = domain.cells;
-    const std::size_t count = flow.grid().cell_count();
-    std::vector<std::uint8_t> inside(count, 0);
-    for (std::size_t g = 0; g < scene.bodies.size(); ++g) {
-        const int body = static_cast<int>(g);
-        const BodyInfo& grain = scene.bodies[g];
-        if (!grain.apparent || !scene.world.active(body)) continue;
-        const double reach = scene.world.bounding_radius(body);
-        const Vector3d x = scene.world.position(body);
-        const Eigen::Matrix3d turn = scene.world.orientation(body).conjugate().toRotationMatrix() / scene.world.scale(body);
-        const Eigen::Vector3i first = ((x - domain.origin).array() / domain.cell - reach / domain.cell - 1).floor().cast<int>().max(0);
-        const Eigen::Vector3i last = ((x - domain.origin).array() / domain.cell + reach / domain.cell + 1).ceil().cast<int>().min(cells.array() - 1);
-        for (int k = first.z(); k <= last.z(); ++k)
-            for (int j = first.y(); j <= last.y(); ++j)
-                for (int i = first.x(); i <= last.x(); ++i)
-                    if (grain.apparent->contains(turn * (flow.cell_centre(i, j, k) - x)))
-                        inside[static_cast<std::size_t>(i) + static_cast<std::size_t>(cells.x()) * (static_cast<std::size_t>(j) + static_cast<std::size_t>(cells.y()) * static_cast<std::size_t>(k))] = 1;
-    }
+    const std::vector<Region> regions = regions_->find(simulation);
     const bool sample = !scene.bodies.empty();
-    Eigen::Array4d total = parallel_sum(static_cast<std::size_t>(cells.z()), 1, Eigen::Array4d::Zero().eval(), [&](std::size_t k, std::size_t) {
-        Eigen::Array4d sum = Eigen::Array4d::Zero();
+    using Sums = Eigen::Array<double, 6, 1>;  // of speed and of weight: between grains, in open voids, in sealed ones
+    const Sums total = parallel_sum(static_cast<std::size_t>(cells.z()), 1, Sums::Zero().eval(), [&](std::size_t k, std::size_t) {
+        Sums sum = Sums::Zero();
         const double z = domain.origin.z() + (static_cast<double>(k) + 0.5) * domain.cell;
         if (sample && (z < scene.lower.z() || z > scene.upper.z())) return sum;
         std::size_t n = k * static_cast<std::size_t>(cells.x()) * static_cast<std::size_t>(cells.y());
         for (int j = 0; j < cells.y(); ++j)
             for (int i = 0; i < cells.x(); ++i, ++n) {
                 const double open = 1 - simulation.solid_fraction(flow.layout().index(i, j, static_cast<int>(k)));
-                if (open < 0.5) continue;
-                const double speed = flow.cell_velocity(i, j, static_cast<int>(k)).norm();
-                const int part = inside[n] ? 2 : 0;
-                sum[part] += open * speed;
+                if (open < 0.5 || regions[n] == Region::surface) continue;
+                const int part = regions[n] == Region::between ? 0 : regions[n] == Region::open ? 2 : 4;
+                sum[part] += open * flow.cell_velocity(i, j, static_cast<int>(k)).norm();
                 sum[part + 1] += open;
             }
         return sum;
     });
-    put("velocity_interparticle", "m s-1", total[1] > 0 ? total[0] / total[1] : 0);
-    put("velocity_intraparticle", "m s-1", total[3] > 0 ? total[2] / total[3] : 0);
+    const auto mean = [&](int part) { return total[part + 1] > 0 ? total[part] / total[part + 1] : 0; };
+    put("velocity_interparticle", "m s-1", mean(0));
+    put("velocity_intraparticle", "m s-1", mean(2));
+    put("velocity_sealed", "m s-1", mean(4));
     put("intraparticle_volume", "m3", total[3] * std::pow(domain.cell, 3));
+    put("sealed_volume", "m3", total[5] * std::pow(domain.cell, 3));
 }
 
 void Observer::record_forces(const Simulation& simulation)
@@ -234,19 +229,24 @@ void Observer::record_forces(const Simulation& simulation)
 void Observer::record_contacts(const Simulation& simulation)
 {
     const Scene& scene = simulation.scene();
-    Eigen::Matrix3d all = Eigen::Matrix3d::Zero(), coarse = all;
-    double all_count = 0, coarse_count = 0;
+    std::vector<Vector3d> all, coarse;
     for (const dem::Contact& contact : scene.world.contacts()) {
         if (contact.second < 0) continue;
-        const Eigen::Matrix3d n = contact.normal * contact.normal.transpose();
-        all += n, all_count += 1;
-        if (!scene.bodies[static_cast<std::size_t>(contact.first)].coarse || !scene.bodies[static_cast<std::size_t>(contact.second)].coarse) continue;
-        coarse += n, coarse_count += 1;
+        all.push_back(contact.normal);
+        if (scene.bodies[static_cast<std::size_t>(contact.first)].coarse && scene.bodies[static_cast<std::size_t>(contact.second)].coarse) coarse.push_back(contact.normal);
     }
-    put("contact_anisotropy", "1", anisotropy(all, all_count));
-    put("contact_anisotropy_coarse", "1", anisotropy(coarse, coarse_count));
+    const Fabric fabric = fabric_of(all), of_coarse = fabric_of(coarse);
+    const Eigen::Matrix3d& f = fabric.tensor;
+    const std::array<double, 6> components{f(0, 0), f(1, 1), f(2, 2), f(0, 1), f(0, 2), f(1, 2)};
+    put("contact_count", "1", fabric.count);
+    put("contact_fabric", "1", components);
+    put("contact_anisotropy", "1", fabric.anisotropy);
+    put("contact_anisotropy_error", "1", fabric.error);
+    put("contact_anisotropy_floor", "1", fabric.floor);
+    put("contact_anisotropy_coarse", "1", of_coarse.anisotropy);
+    put("contact_anisotropy_coarse_error", "1", of_coarse.error);
     const int active = scene.world.active_count();
-    put("coordination", "1", active > 0 ? 2 * all_count / active : 0);
+    put("coordination", "1", active > 0 ? 2 * fabric.count / active : 0);
     const dem::Energy energy = scene.world.energy();
     put("kinetic_energy", "J", energy.kinetic);
     put("elastic_energy", "J", energy.elastic_normal + energy.elastic_tangential);
@@ -275,19 +275,36 @@ void Observer::record_trajectories(const Simulation& simulation)
         add(5, in ? simulation.fluid_force(static_cast<std::size_t>(id)) : Vector3d::Zero().eval());
         add(6, in ? simulation.fluid_torque(static_cast<std::size_t>(id)) : Vector3d::Zero().eval());
         add(7, in ? world.contact_forces()[static_cast<std::size_t>(id)] : Vector3d::Zero().eval());
+        const auto fine = std::ranges::lower_bound(results_.fines, id);
+        const bool is_fine = fine != results_.fines.end() && *fine == id;
+        results_.trajectories[8].values.push_back(is_fine ? static_cast<double>(results_.state[static_cast<std::size_t>(fine - results_.fines.begin())]) : -1.0);
     }
 }
 
 void Observer::record_migration(const Simulation& simulation)
 {
+    const double elapsed = simulation.time() - last_time_;
+    std::array<double, 4> count{};
+    double cloggings = 0, uncloggings = 0;
     for (std::size_t n = 0; n < results_.fines.size(); ++n) {
-        const int body = static_cast<int>(results_.fines[n]);
-        const Vector3d& x = simulation.scene().world.position(body);
-        results_.path_length[n] += (x - last_[n]).norm();
+        const std::size_t body = static_cast<std::size_t>(results_.fines[n]);
+        const Vector3d& x = simulation.scene().world.position(static_cast<int>(body));
+        const double moved = (x - last_[n]).norm();
+        motion_[n].update(elapsed > 0 ? moved / elapsed : 0, simulation.scene().bodies[body].diameter, simulation.eroded(body));
+        results_.path_length[n] += moved;
         results_.net_displacement[n] = (x - start_[n]).norm();
-        results_.eroded[n] = simulation.eroded(static_cast<std::size_t>(body));
+        results_.eroded[n] = simulation.eroded(body);
+        results_.state[n] = static_cast<std::int64_t>(motion_[n].state());
+        results_.cloggings[n] = motion_[n].cloggings();
+        count[static_cast<std::size_t>(motion_[n].state())] += 1;
+        cloggings += static_cast<double>(motion_[n].cloggings());
+        uncloggings += static_cast<double>(motion_[n].uncloggings());
         last_[n] = x;
     }
+    put("moving_count", "1", count[static_cast<std::size_t>(FineState::moving)]);
+    put("clogged_count", "1", count[static_cast<std::size_t>(FineState::clogged)]);
+    put("clogging_events", "1", cloggings);
+    put("unclogging_events", "1", uncloggings);
 }
 
 std::vector<std::uint8_t> Observer::save() const
@@ -295,6 +312,10 @@ std::vector<std::uint8_t> Observer::save() const
     ByteWriter out;
     out.vectors(last_);
     out.array<double>(results_.path_length);
+    out.number(last_time_);
+    for (const MotionState& m : motion_) out.integer(static_cast<std::int64_t>(m.state())), out.integer(m.cloggings()), out.integer(m.uncloggings());
+    out.integer(static_cast<std::int64_t>(trapped_.size()));
+    for (const Trapped& t : trapped_) out.integer(t.fine), out.integer(t.grain), out.integer(t.enclosed), out.number(t.since);
     return out.bytes();
 }
 
@@ -305,8 +326,16 @@ void Observer::resume(Results stored, std::size_t rows, std::span<const std::uin
     std::vector<double> paths = in.array<double>();
     const std::size_t parts = stored.trajectories.size();
     if (stored.tracked != results_.tracked || stored.fines != results_.fines || stored.rows() < rows || last.size() != last_.size() ||
-        paths.size() != last.size() || parts == 0)
-        throw Error("results.h5", "is of another case or damaged", "run without --resume to start anew");
+        paths.size() != last.size() || parts != trajectory_parts.size() || stored.column("fines_count").width != layers_)
+        throw Error("results.h5", "is of another case or of an older version, or damaged", "run without --resume to start anew");
+    last_time_ = in.number();
+    for (MotionState& m : motion_) {
+        const auto known = static_cast<FineState>(in.integer());
+        const std::int64_t cloggings = in.integer();
+        m = MotionState::restored(known, cloggings, in.integer());
+    }
+    trapped_.resize(static_cast<std::size_t>(std::clamp<std::int64_t>(in.integer(), 0, static_cast<std::int64_t>(last.size()))));
+    for (Trapped& t : trapped_) t.fine = in.integer(), t.grain = in.integer(), t.enclosed = in.integer() != 0, t.since = in.number();
     stored.truncate(rows);
     results_.series = std::move(stored.series);
     // The file lists its columns by name; rows are appended by place.
@@ -315,8 +344,13 @@ void Observer::resume(Results stored, std::size_t rows, std::span<const std::uin
             if (column.name == part.name) results_.trajectories.push_back(std::move(column));
     results_.path_length = std::move(paths);
     last_ = std::move(last);
-    for (std::size_t n = 0; n < last_.size(); ++n) results_.net_displacement[n] = (last_[n] - start_[n]).norm();
+    for (std::size_t n = 0; n < last_.size(); ++n) {
+        results_.net_displacement[n] = (last_[n] - start_[n]).norm();
+        results_.state[n] = static_cast<std::int64_t>(motion_[n].state());
+        results_.cloggings[n] = motion_[n].cloggings();
+    }
     results_.eroded = std::move(stored.eroded);
+    results_.trapped = trapped_;
 }
 
 }  // namespace coral::suffusion

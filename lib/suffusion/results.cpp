@@ -25,6 +25,36 @@ Column read_column(const H5File& h5, const std::string& group, const std::string
     return {name, h5.string_attribute(path, "unit"), dims.size() > plain_rank ? std::max<std::size_t>(dims.back(), 1) : 1, h5.read_doubles(path)};
 }
 
+void write_trapped(H5File& h5, const std::vector<Trapped>& trapped)
+{
+    std::vector<std::int64_t> fine, grain, enclosed;
+    std::vector<double> since;
+    for (const Trapped& t : trapped) {
+        fine.push_back(t.fine);
+        grain.push_back(t.grain);
+        enclosed.push_back(t.enclosed);
+        since.push_back(t.since);
+    }
+    const std::size_t n = trapped.size();
+    h5.write("/trapped/fine", std::span<const std::int64_t>(fine), {n});
+    h5.write("/trapped/grain", std::span<const std::int64_t>(grain), {n});
+    h5.write("/trapped/enclosed", std::span<const std::int64_t>(enclosed), {n});
+    h5.write("/trapped/since", std::span<const double>(since), {n});
+    h5.set_attribute("/trapped/since", "unit", "s");
+}
+
+std::vector<Trapped> read_trapped(const H5File& h5)
+{
+    if (!h5.exists("/trapped/fine")) return {};
+    const auto fine = h5.read_integers("/trapped/fine"), grain = h5.read_integers("/trapped/grain"), enclosed = h5.read_integers("/trapped/enclosed");
+    const auto since = h5.read_doubles("/trapped/since");
+    if (grain.size() != fine.size() || enclosed.size() != fine.size() || since.size() != fine.size())
+        throw Error(h5.path().string() + ":/trapped", "has columns of different length", "run suffuse again");
+    std::vector<Trapped> trapped;
+    for (std::size_t i = 0; i < fine.size(); ++i) trapped.push_back({fine[i], grain[i], enclosed[i] != 0, since[i]});
+    return trapped;
+}
+
 }  // namespace
 
 std::size_t Results::rows() const { return series.empty() ? 0 : series.front().values.size() / series.front().width; }
@@ -62,6 +92,9 @@ void write_results(const std::filesystem::path& file, const Results& results)
     for (const char* name : {"path_length", "net_displacement"}) h5.set_attribute(std::string("/migration/") + name, "unit", "m");
     h5.write("/migration/layer", std::span<const std::int64_t>(results.layer), {fines});
     h5.write("/migration/eroded", std::span<const std::int64_t>(results.eroded), {fines});
+    h5.write("/migration/state", std::span<const std::int64_t>(results.state), {fines});
+    h5.write("/migration/cloggings", std::span<const std::int64_t>(results.cloggings), {fines});
+    write_trapped(h5, results.trapped);
     for (const Measure& m : results.performance) {
         h5.write("/performance/" + m.name, std::span<const double>(&m.value, 1), {1});
         h5.set_attribute("/performance/" + m.name, "unit", m.unit);
@@ -90,6 +123,9 @@ Results read_results(const std::filesystem::path& file)
     results.net_displacement = h5.read_doubles("/migration/net_displacement");
     results.layer = h5.read_integers("/migration/layer");
     results.eroded = h5.read_integers("/migration/eroded");
+    if (h5.exists("/migration/state")) results.state = h5.read_integers("/migration/state");
+    if (h5.exists("/migration/cloggings")) results.cloggings = h5.read_integers("/migration/cloggings");
+    results.trapped = read_trapped(h5);
     for (const std::string& name : h5.members("/performance"))
         results.performance.push_back({name, h5.string_attribute("/performance/" + name, "unit"), h5.read_doubles("/performance/" + name).at(0)});
     if (h5.has_attribute("/", "history")) results.history = h5.string_attribute("/", "history");

@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "suffusion/trapping.h"
+
 namespace coral::suffusion {
 
 /// One quantity over time: `width` numbers for each row (series) or for each row and tracked body (trajectories).
@@ -30,8 +32,11 @@ struct Results {
     std::vector<std::int64_t> fines;      ///< /migration/id
     std::vector<double> path_length;      ///< moves summed over the outputs [m]
     std::vector<double> net_displacement; ///< [m]
-    std::vector<std::int64_t> layer;      ///< at the start: 0 bottom, 1 middle, 2 top
+    std::vector<std::int64_t> layer;      ///< at the start: 0 bottom ... layers - 1 top
     std::vector<std::int64_t> eroded;     ///< 1 once below the filter plate
+    std::vector<std::int64_t> state;      ///< FineState at the last output
+    std::vector<std::int64_t> cloggings;  ///< how often the fine stopped after moving
+    std::vector<Trapped> trapped;         ///< /trapped: fines in voids at the last output
     std::vector<Measure> performance;     ///< wall-clock values: the only part of the file that differs between two equal runs
     std::string history;                  ///< JSON
     std::string case_text;                ///< case.toml as read

@@ -24,6 +24,9 @@ Results two_rows()
     r.net_displacement = {0.125};
     r.layer = {2};
     r.eroded = {0};
+    r.state = {2};
+    r.cloggings = {3};
+    r.trapped = {{7, 0, true, 0.25}};
     r.performance = {{"seconds_contact", "s", 1.5}};
     r.history = "[]";
     r.case_text = "a = 1\n";
@@ -46,6 +49,12 @@ TEST(Results, come_back_as_they_were_written)
     EXPECT_EQ(r.trajectories[1].width, 1u);
     EXPECT_EQ(r.tracked, two_rows().tracked);
     EXPECT_EQ(r.path_length, two_rows().path_length);
+    EXPECT_EQ(r.state, two_rows().state);
+    EXPECT_EQ(r.cloggings, two_rows().cloggings);
+    ASSERT_EQ(r.trapped.size(), 1u);
+    EXPECT_EQ(r.trapped[0].fine, 7);
+    EXPECT_TRUE(r.trapped[0].enclosed);
+    EXPECT_EQ(r.trapped[0].since, 0.25);
     EXPECT_EQ(r.performance.at(0).value, 1.5);
     EXPECT_EQ(r.case_text, "a = 1\n");
 }
