@@ -80,6 +80,20 @@ void read_migration(const H5File& file, CaseData& data)
     };
     migration.layer = flags("/migration/layer");
     migration.eroded = flags("/migration/eroded");
+    migration.state = flags("/migration/state");
+    migration.cloggings = flags("/migration/cloggings");
+}
+
+void read_trapped(const H5File& file, CaseData& data)
+{
+    if (!file.exists("/trapped/fine")) return;
+    TrappedFines& trapped = data.trapped;
+    trapped.fine = file.read_integers("/trapped/fine");
+    trapped.grain = file.read_integers("/trapped/grain");
+    trapped.enclosed = file.read_integers("/trapped/enclosed");
+    if (trapped.grain.size() == trapped.fine.size() && trapped.enclosed.size() == trapped.fine.size()) return;
+    trapped = {};
+    data.notes.push_back("/trapped of results.h5 has columns of different length and was left out.");
 }
 
 /// Every number below a group as one line, sub-groups with their names in front.
@@ -129,9 +143,11 @@ CaseData read_case(const fs::path& folder)
     read_series(file, data);
     read_tracks(file, data);
     read_migration(file, data);
+    read_trapped(file, data);
+    if (const Series* fines = data.find("fines_count")) data.layers = fines->width;
     read_performance(file, "/performance", "", data);
     detail::read_history(file, data);
-    if (file.has_attribute("/", "case")) data.case_toml = file.string_attribute("/", "case");
+    if (file.exists("/case")) data.case_toml = file.read_strings("/case").at(0);
     if (data.case_toml.empty() && fs::is_regular_file(folder / "case.toml")) data.case_toml = read_text_file(folder / "case.toml");
     detail::read_case_text(data);
     const bool named_sample = !data.sample.empty();
@@ -145,14 +161,23 @@ CaseData read_case(const fs::path& folder)
 std::vector<CaseData> read_cases(const std::vector<fs::path>& folders)
 {
     std::vector<CaseData> cases;
-    for (const fs::path& folder : folders) cases.push_back(read_case(folder));
-    std::map<std::string, int> count;
-    for (const CaseData& data : cases) ++count[data.name];
+    for (const fs::path& given : folders) {
+        const std::string text = given.string();
+        const std::size_t sign = text.find('=');
+        const bool labelled = sign != std::string::npos && sign > 0 && !fs::exists(given);
+        cases.push_back(read_case(labelled ? fs::path(text.substr(sign + 1)) : given));
+        if (labelled) cases.back().label = text.substr(0, sign);
+    }
+    std::map<std::string, int> count, labels;
+    for (const CaseData& data : cases) ++count[data.name], ++labels[data.label];
+    for (CaseData& data : cases) {
+        const fs::path parent = fs::absolute(data.folder / ".").lexically_normal().parent_path().parent_path();
+        if (!data.label.empty()) data.name = labels[data.label] > 1 ? data.label + ", " + data.name : data.label;
+        else if (count[data.name] > 1) data.name = (parent.filename() / data.name).string();
+    }
+    // gnuplot ends a quoted field of a csv at the first double quote inside it.
     for (CaseData& data : cases)
-        if (count[data.name] > 1) {
-            const fs::path parent = fs::absolute(data.folder / ".").lexically_normal().parent_path().parent_path();
-            data.name = (parent.filename() / data.name).string();
-        }
+        for (std::string* text : {&data.name, &data.label}) std::ranges::replace(*text, '"', '\'');
     std::set<std::string> seen;
     for (CaseData& data : cases) {
         const std::string name = data.name;
@@ -166,10 +191,12 @@ std::vector<std::string> column_names(const std::string& series, std::size_t wid
     if (width == 1) return {series};
     static const char* const layers[] = {"bottom", "middle", "top"};
     static const char* const axes[] = {"x", "y", "z"};
+    static const char* const pairs[] = {"xx", "yy", "zz", "xy", "xz", "yz"};
     std::vector<std::string> names;
     for (std::size_t i = 0; i < width; ++i) {
         std::string suffix = std::to_string(i + 1);
         if (width == 3) suffix = series == "fines_count" ? layers[i] : axes[i];
+        if (width == 6 && series == "contact_fabric") suffix = pairs[i];
         names.push_back(series + "_" + suffix);
     }
     return names;

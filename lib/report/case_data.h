@@ -35,8 +35,16 @@ struct Migration {
     std::vector<std::int64_t> id;
     std::vector<double> path_length;       ///< summed moves between outputs [m]
     std::vector<double> net_displacement;  ///< between the first and the last output [m]
-    std::vector<std::int64_t> layer;       ///< layer at the start: 0 bottom, 1 middle, 2 top
+    std::vector<std::int64_t> layer;       ///< layer at the start, 0 at the bottom
     std::vector<std::int64_t> eroded;      ///< 1 once below the filter plate
+    std::vector<std::int64_t> state;       ///< at the end: 0 never moved, 1 moving, 2 clogged, 3 eroded; empty in older results
+    std::vector<std::int64_t> cloggings;   ///< how often the fine stopped after moving
+};
+
+/// `/trapped`: fines in the voids of grains at the end.
+struct TrappedFines {
+    std::vector<std::int64_t> fine, grain;  ///< body numbers
+    std::vector<std::int64_t> enclosed;     ///< 1 when the whole fine is inside, 0 in the mouth of a void
 };
 
 /// A body as drawn: `shape` is the template k of `/shapes/<k>` in sample.h5, or -1 for a sphere that case.toml describes.
@@ -67,11 +75,16 @@ struct Plate {
 
 struct CaseData {
     std::string name;  ///< shown in legends and in the column `case`
+    std::string label; ///< runs with the same label repeat one case with other packings; empty when none was given
+    std::size_t repeats = 1;              ///< runs behind it (pool.h)
+    std::map<std::string, Series> low, high;  ///< least and greatest over the repeats; empty for one run
     std::filesystem::path folder;
     std::vector<double> time;  ///< [s]
     std::map<std::string, Series> series;
     Tracks tracks;
     Migration migration;
+    TrappedFines trapped;
+    std::size_t layers = 3;               ///< that fines are counted in
     std::vector<Setting> performance;
     History history;
 
@@ -98,9 +111,12 @@ struct CaseData {
 CaseData read_case(const std::filesystem::path& folder);
 
 /// Reads several cases and makes their names unique (folder name; with its parent when two agree).
+/// A folder may be given as LABEL=FOLDER: the case is then called so; several with one label are repeats, called "LABEL, folder name".
+/// What exists as it stands is a folder, whatever signs it holds.
 std::vector<CaseData> read_cases(const std::vector<std::filesystem::path>& folders);
 
-/// Column names of a series: itself, or with `_bottom, _middle, _top`, `_x, _y, _z`, `_1` ... when it has several components.
+/// Column names of a series: itself, or with `_bottom, _middle, _top` (fines_count of three layers), `_xx` ... (contact_fabric), `_x, _y, _z`,
+/// `_1` ... (from the bottom upwards for layers) when it has several components.
 std::vector<std::string> column_names(const std::string& series, std::size_t width);
 
 }  // namespace coral::report

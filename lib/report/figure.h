@@ -15,6 +15,8 @@ namespace coral::report {
 struct Curve {
     std::string column;
     std::string label;  ///< empty when the panel holds only one column
+    std::string low, high;  ///< columns of the band around it; empty without
+    std::string x_column;   ///< of its own abscissa (paths); empty: that of the figure
 };
 
 /// Axes with one or more columns. Table values (SI) times `factor` are drawn.
@@ -24,9 +26,16 @@ struct Panel {
     double factor = 1;
     bool logarithmic = false;
     std::vector<Curve> curves;
+    std::string only_case;  ///< the one case that it shows; empty: all
 };
 
-enum class FigureKind { lines, steps, bars };
+enum class FigureKind {
+    lines,
+    steps,
+    bars,    ///< first curve outlined, second filled, over figure.categories
+    paths,   ///< curves over abscissae of their own, axes of one scale
+    table,   ///< the table as text
+};
 
 struct Figure {
     std::string name;     ///< stem of its files
@@ -39,10 +48,11 @@ struct Figure {
     Table table;          ///< first column `case`, then x and the curves, SI
     std::vector<Panel> panels;
     std::vector<std::string> cases;  ///< values of the column `case`, in drawing order
+    std::vector<std::string> categories;  ///< of bars: names of x = 0, 1, ...
     bool over_time = false;          ///< x is the time of the series (the page then offers interactive curves)
 };
 
-/// Figures that the cases have finite data for, in the order of the page.
+/// Figures that the cases have finite data for, in the order of the page; repeats as mean and band (pool.h).
 std::vector<Figure> make_figures(const std::vector<CaseData>& cases);
 
 /// All series of all cases: `case,time,eroded_mass_fraction,...`; series that a case lacks are empty cells.

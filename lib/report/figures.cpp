@@ -1,22 +1,19 @@
-// Which figures there are, and the tables behind them. Numbers in brackets are the figures of Huang et al. that they answer.
+// Which figures there are, and the tables behind those over time. Numbers in brackets are the figures of Huang et al. that they answer.
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
-#include <numeric>
 
-#include "report/figure.h"
+#include "report/detail/figures.h"
+#include "report/pool.h"
 
 namespace coral::report {
 namespace {
 
-constexpr double nan_value = std::numeric_limits<double>::quiet_NaN();
+using detail::has_fines;
+using detail::number_cell;
 
-Cell number_cell(double value)
-{
-    if (std::isfinite(value)) return value;
-    return std::string();
-}
+constexpr double nan_value = std::numeric_limits<double>::quiet_NaN();
 
 /// A panel as specified: series (with component) instead of columns.
 struct PanelSpec {
@@ -39,23 +36,24 @@ const std::vector<TimeFigure>& time_figures()
     static const std::vector<TimeFigure> all{
         {"eroded_mass", "Eroded mass", "Mass of the fines below the filter plate over the mass of all fines at the start [Figs 11, 19, 23].",
          {{"", "eroded fines [% of mass]", 100, false, {{"eroded_mass_fraction", ""}}}}},
-        {"fines_per_layer", "Fines per layer", "Fines in each third of the initial height of the sample [Figs 13, 20].",
-         {{"Top layer", "fines [count]", 1, false, {{"fines_count_top", ""}}},
-          {"Middle layer", "fines [count]", 1, false, {{"fines_count_middle", ""}}},
-          {"Bottom layer", "fines [count]", 1, false, {{"fines_count_bottom", ""}}}}},
+        {"fines_per_layer", "Fines per layer", "Fines in each layer of the initial height of the sample [Figs 13, 20].", {}},
         {"hydraulic_gradient", "Hydraulic gradient", "Loss of head over the length of the sample [Fig. 15a].",
          {{"", "hydraulic gradient [-]", 1, false, {{"hydraulic_gradient", ""}}}}},
         {"hydraulic_conductivity", "Hydraulic conductivity", "Superficial velocity over hydraulic gradient [Fig. 15b].",
          {{"", "hydraulic conductivity [cm/s]", 100, false, {{"hydraulic_conductivity", ""}}}}},
-        {"trapped_fines", "Trapped fines", "Fines whose centre lies in a void inside a grain [Fig. 12]. Unless [contact] spheres = \"walls\", throats of level sets are tighter for spheres by "
-         "about half a lattice spacing, which overstates trapping.",
-         {{"", "trapped fines [count]", 1, false, {{"trapped_count", ""}}}}},
+        {"fine_states", "Moving and clogged fines",
+         "Fines that move (from 4 diameters a second on, until they fall below 1) and fines that stopped after they had moved [Fig. 14].",
+         {{"Now", "fines [count]", 1, false, {{"moving_count", "moving"}, {"clogged_count", "clogged"}}},
+          {"Since the start", "events [count]", 1, false, {{"clogging_events", "clogged"}, {"unclogging_events", "went on"}}}}},
+        {"trapped_fines", "Trapped fines", "Fines whose centre lies in a void inside a grain, those of them that are wholly inside (the others sit in its mouth), and those that came in during "
+         "the run [Fig. 12]. Unless [contact] spheres = \"walls\", throats of level sets are tighter for spheres by about half a lattice spacing, which overstates trapping.",
+         {{"", "trapped fines [count]", 1, false, {{"trapped_count", "all"}, {"trapped_enclosed", "wholly inside"}, {"trapped_entered", "came in"}}}}},
         {"flow_velocity", "Flow between and inside grains",
-         "Mean speed of the water between the grains, and inside their voids (within the filled shape of a grain) [Fig. 17].",
+         "Mean speed of the water between the grains, and in their voids that are linked to the outside, a cell or more below the surface [Fig. 17].",
          {{"", "mean speed [m/s]", 1, false, {{"velocity_interparticle", "between grains"}, {"velocity_intraparticle", "inside grains"}}}}},
         {"fluid_forces", "Force of the flow on the grains", "Mean magnitude for each grain of the population [Fig. 25].",
          {{"", "mean fluid force [N]", 1, true, {{"fluid_force_coarse", "coarse"}, {"fluid_force_fine", "fine"}}}}},
-        {"contact_anisotropy", "Anisotropy of contact normals", "Degree of anisotropy from the deviator of the fabric tensor [Fig. 26].",
+        {"contact_anisotropy", "Anisotropy of contact normals", "Degree of anisotropy from the deviator of the fabric tensor; band: its standard error, or the spread of repeats [Fig. 26].",
          {{"", "anisotropy [-]", 1, false, {{"contact_anisotropy", ""}}}}},
         {"coordination", "Coordination number", "Mean number of contacts of a grain.",
          {{"", "coordination number [-]", 1, false, {{"coordination", ""}}}}},
@@ -68,27 +66,19 @@ const std::vector<TimeFigure>& time_figures()
     return all;
 }
 
-/// Whether a case has fines at all: without, curves of erosion are flat lines that say nothing.
-bool has_fines(const CaseData& data)
-{
-    const Series* fines = data.find("fines_count");
-    const Series* eroded = data.find("eroded_mass_fraction");
-    const auto any = [](const Series* series) { return series && std::ranges::any_of(series->values, [](double v) { return v > 0; }); };
-    return !fines || any(fines) || any(eroded);
-}
-
-bool about_fines(const std::string& figure) { return figure == "eroded_mass" || figure == "fines_per_layer" || figure == "trapped_fines"; }
+bool about_fines(const std::string& figure) { return figure == "eroded_mass" || figure == "fines_per_layer" || figure == "trapped_fines" || figure == "fine_states"; }
 
 /// Series and component behind a column name, or null.
 struct Source {
     const Series* series = nullptr;
     std::size_t component = 0;
+    double at(std::size_t step) const { return series && step < series->steps() ? series->at(step, component) : nan_value; }
 };
 
-Source find_column(const CaseData& data, const std::string& column)
+Source find_column(const std::map<std::string, Series>& all, const std::string& column)
 {
-    if (const Series* direct = data.find(column); direct && direct->width == 1) return {direct, 0};
-    for (const auto& [name, series] : data.series) {
+    if (const auto direct = all.find(column); direct != all.end() && direct->second.width == 1) return {&direct->second, 0};
+    for (const auto& [name, series] : all) {
         if (column.rfind(name, 0) != 0) continue;
         const auto names = column_names(name, series.width);
         const auto it = std::ranges::find(names, column);
@@ -97,26 +87,53 @@ Source find_column(const CaseData& data, const std::string& column)
     return {};
 }
 
-bool has_finite(const Table& table, std::size_t column, const std::string& of_case = {})
+bool has_finite(const Table& table, std::size_t column)
 {
-    return std::ranges::any_of(table.rows, [&](const std::vector<Cell>& row) {
-        return std::holds_alternative<double>(row[column]) && (of_case.empty() || std::get<std::string>(row[0]) == of_case);
-    });
+    return std::ranges::any_of(table.rows, [&](const std::vector<Cell>& row) { return std::holds_alternative<double>(row[column]); });
 }
 
 /// Drops curves and panels without data, and then cases without a row.
 void keep_drawable(Figure& figure)
 {
-    for (Panel& panel : figure.panels)
-        std::erase_if(panel.curves, [&](const Curve& curve) {
-            const auto it = std::ranges::find(figure.table.columns, curve.column);
-            return it == figure.table.columns.end() || !has_finite(figure.table, static_cast<std::size_t>(it - figure.table.columns.begin()));
-        });
+    const auto there = [&](const std::string& name) {
+        const auto it = std::ranges::find(figure.table.columns, name);
+        return it != figure.table.columns.end() && has_finite(figure.table, static_cast<std::size_t>(it - figure.table.columns.begin()));
+    };
+    for (Panel& panel : figure.panels) {
+        std::erase_if(panel.curves, [&](const Curve& curve) { return !there(curve.column); });
+        for (Curve& curve : panel.curves)
+            if (!there(curve.low)) curve.low.clear(), curve.high.clear();
+    }
     std::erase_if(figure.panels, [](const Panel& panel) { return panel.curves.empty(); });
     for (const auto& row : figure.table.rows) {
         const std::string& name = std::get<std::string>(row[0]);
         if (std::ranges::find(figure.cases, name) == figure.cases.end()) figure.cases.push_back(name);
     }
+}
+
+/// Panels of the figure of layers: as many as the cases have, the topmost first.
+std::vector<PanelSpec> layer_panels(const std::vector<CaseData>& cases, std::vector<std::string>& names)
+{
+    std::size_t layers = 0;
+    for (const CaseData& data : cases)
+        if (data.find("fines_count")) layers = std::max(layers, data.layers);
+    const std::vector<std::string> columns = column_names("fines_count", layers), titles = detail::layer_names(layers);
+    names.clear();
+    for (std::size_t k = layers; k-- > 0;) {
+        names.push_back((layers == 3 ? std::string(1, static_cast<char>(titles[k][0] - 32)) + titles[k].substr(1) + " layer" : "Layer " + titles[k]));
+        names.push_back(columns[k]);
+    }
+    std::vector<PanelSpec> panels;
+    for (std::size_t k = 0; k < layers; ++k) panels.push_back({names[2 * k].c_str(), "fines [count]", 1, false, {{names[2 * k + 1].c_str(), ""}}});
+    return panels;
+}
+
+/// The band around one value of a case: least and greatest of its repeats; of a single run, value -+ standard error where the run has one.
+std::array<double, 2> band_at(const CaseData& data, const std::string& column, double value, std::size_t step)
+{
+    if (data.repeats > 1) return {find_column(data.low, column).at(step), find_column(data.high, column).at(step)};
+    const double error = find_column(data.series, column + "_error").at(step);
+    return {value - error, value + error};
 }
 
 Figure make_time_figure(const TimeFigure& spec, const std::vector<CaseData>& cases)
@@ -129,167 +146,58 @@ Figure make_time_figure(const TimeFigure& spec, const std::vector<CaseData>& cas
     figure.x_label = "time [s]";
     figure.over_time = true;
     figure.table.columns = {"case", "time"};
-    for (const PanelSpec& panel : spec.panels) {
-        Panel made{panel.title, panel.y_label, panel.factor, panel.logarithmic, {}};
+    std::vector<std::string> names;  // keeps the texts of panels made here
+    const std::vector<PanelSpec> panels = spec.panels.empty() ? layer_panels(cases, names) : spec.panels;
+    std::vector<std::string> columns;
+    for (const PanelSpec& panel : panels) {
+        Panel made{panel.title, panel.y_label, panel.factor, panel.logarithmic, {}, {}};
         for (const auto& [column, label] : panel.curves) {
-            made.curves.push_back({column, label});
-            figure.table.columns.emplace_back(column);
+            made.curves.push_back({column, label, std::string(column) + "_low", std::string(column) + "_high", {}});
+            columns.emplace_back(column);
+            for (const char* end : {"", "_low", "_high"}) figure.table.columns.push_back(std::string(column) + end);
         }
         figure.panels.push_back(made);
     }
     for (const CaseData& data : cases) {
         if (about_fines(figure.name) && !has_fines(data)) continue;
         std::vector<Source> sources;
-        for (std::size_t c = 2; c < figure.table.columns.size(); ++c) sources.push_back(find_column(data, figure.table.columns[c]));
+        for (const std::string& column : columns) sources.push_back(find_column(data.series, column));
         if (std::ranges::none_of(sources, [](const Source& s) { return s.series != nullptr; })) continue;
         for (std::size_t i = 0; i < data.time.size(); ++i) {
             std::vector<Cell> row{data.name, data.time[i]};
-            for (const Source& s : sources) row.push_back(number_cell(s.series ? s.series->at(i, s.component) : nan_value));
+            for (std::size_t c = 0; c < columns.size(); ++c) {
+                const double value = sources[c].at(i);
+                const auto [low, high] = band_at(data, columns[c], value, i);
+                for (const double v : {value, low, high}) row.push_back(number_cell(v));
+            }
             figure.table.add(std::move(row));
         }
     }
-    return figure;
-}
-
-/// Fines in each layer at the first and the last output [Fig. 24].
-Figure make_layer_bars(const std::vector<CaseData>& cases)
-{
-    Figure figure;
-    figure.name = "fines_left";
-    figure.title = "Fines per layer before and after";
-    figure.caption = "Fines in each third of the initial height at the start (outlined) and at the end (filled) [Fig. 24].";
-    figure.kind = FigureKind::bars;
-    figure.x_column = "layer";
-    figure.table.columns = {"case", "layer", "count_start", "count_end"};
-    figure.panels = {{"", "fines [count]", 1, false, {{"count_start", "start"}, {"count_end", "end"}}}};
-    for (const CaseData& data : cases) {
-        const Series* fines = data.find("fines_count");
-        if (!fines || fines->width != 3 || !has_fines(data)) continue;
-        for (std::size_t layer = 0; layer < 3; ++layer)
-            figure.table.add({data.name, static_cast<double>(layer), number_cell(fines->at(0, layer)), number_cell(fines->at(fines->steps() - 1, layer))});
-    }
-    return figure;
-}
-
-/// Number of fines that came farther than d [Fig. 21].
-Figure make_migration(const std::vector<CaseData>& cases)
-{
-    Figure figure;
-    figure.name = "migration_distance";
-    figure.title = "Migration distance";
-    figure.caption = "Number of fines whose path (moves summed over the outputs) is longer than d [Fig. 21].";
-    figure.kind = FigureKind::steps;
-    figure.x_column = "path_length";
-    figure.x_label = "path length d [mm]";
-    figure.x_factor = 1000;
-    figure.table.columns = {"case", "path_length", "count_farther"};
-    figure.panels = {{"", "fines that came farther than d [count]", 1, true, {{"count_farther", ""}}}};
-    for (const CaseData& data : cases) {
-        std::vector<double> path = data.migration.path_length;
-        std::erase_if(path, [](double d) { return !std::isfinite(d); });
-        std::ranges::sort(path);
-        for (std::size_t i = 0; i + 1 < path.size(); ++i)
-            figure.table.add({data.name, path[i], static_cast<double>(path.size() - 1 - i)});
-    }
-    return figure;
-}
-
-/// Cumulative distribution of the path of the fines that start in the top layer [Fig. 13].
-Figure make_top_layer(const std::vector<CaseData>& cases)
-{
-    Figure figure;
-    figure.name = "migration_top_layer";
-    figure.title = "Migration of the fines of the top layer";
-    figure.caption = "Share of the fines that start in the top third whose path is not longer than d [Fig. 13].";
-    figure.kind = FigureKind::steps;
-    figure.x_column = "path_length";
-    figure.x_label = "path length d [mm]";
-    figure.x_factor = 1000;
-    figure.table.columns = {"case", "path_length", "fraction_not_farther"};
-    figure.panels = {{"", "share of the fines [%]", 100, false, {{"fraction_not_farther", ""}}}};
-    for (const CaseData& data : cases) {
-        std::vector<double> path;
-        for (std::size_t i = 0; i < data.migration.layer.size() && i < data.migration.path_length.size(); ++i)
-            if (data.migration.layer[i] == 2 && std::isfinite(data.migration.path_length[i])) path.push_back(data.migration.path_length[i]);
-        std::ranges::sort(path);
-        for (std::size_t i = 0; i < path.size(); ++i)
-            figure.table.add({data.name, path[i], static_cast<double>(i + 1) / static_cast<double>(path.size())});
-    }
-    return figure;
-}
-
-/// Tracked fines with the two longest paths and the two shortest of the top layer: columns of the speeds [Fig. 14].
-std::vector<std::size_t> telling_fines(const CaseData& data)
-{
-    const Migration& m = data.migration;
-    if (data.tracks.speed.empty() || m.path_length.size() != m.id.size() || m.id.size() < 4) return {};
-    std::vector<std::size_t> order(m.id.size());
-    std::iota(order.begin(), order.end(), std::size_t{0});
-    std::erase_if(order, [&](std::size_t i) {
-        return !std::isfinite(m.path_length[i]) || std::ranges::find(data.tracks.id, m.id[i]) == data.tracks.id.end();
-    });
-    std::ranges::stable_sort(order, [&](std::size_t a, std::size_t b) { return m.path_length[a] > m.path_length[b]; });
-    if (order.size() < 4) return {};
-    std::vector<std::size_t> columns;
-    for (std::size_t pick : {order[0], order[1], order[order.size() - 2], order[order.size() - 1]})
-        columns.push_back(static_cast<std::size_t>(std::ranges::find(data.tracks.id, m.id[pick]) - data.tracks.id.begin()));
-    return columns;
-}
-
-Figure make_speeds(const std::vector<CaseData>& cases)
-{
-    Figure figure;
-    figure.name = "fine_speeds";
-    figure.title = "Speed of four fines";
-    figure.caption = "The two tracked fines with the longest path and the two with the shortest [Fig. 14b].";
-    figure.x_column = "time";
-    figure.x_label = "time [s]";
-    figure.table.columns = {"case", "time", "speed_longest_1", "speed_longest_2", "speed_shortest_1", "speed_shortest_2"};
-    figure.panels = {{"Longest paths", "speed [m/s]", 1, false, {{"speed_longest_1", "first"}, {"speed_longest_2", "second"}}},
-                     {"Shortest paths", "speed [m/s]", 1, false, {{"speed_shortest_1", "second"}, {"speed_shortest_2", "first"}}}};
-    for (const CaseData& data : cases) {
-        const auto columns = telling_fines(data);
-        if (columns.empty()) continue;
-        const std::size_t count = data.tracks.id.size();
-        for (std::size_t i = 0; i < data.tracks.time.size(); ++i) {
-            std::vector<Cell> row{data.name, data.tracks.time[i]};
-            for (std::size_t c : columns) row.push_back(number_cell(data.tracks.speed[i * count + c]));
-            figure.table.add(std::move(row));
-        }
-    }
-    return figure;
-}
-
-Figure make_gradation(const std::vector<CaseData>& cases)
-{
-    Figure figure;
-    figure.name = "particle_size_distribution";
-    figure.title = "Particle size distribution";
-    figure.caption = "Mass passing over equivalent diameter (of the filled shape), from the grains of the sample [Fig. 8].";
-    figure.kind = FigureKind::steps;
-    figure.x_column = "diameter";
-    figure.x_label = "equivalent diameter [mm]";
-    figure.x_factor = 1000;
-    figure.x_logarithmic = true;
-    figure.table.columns = {"case", "diameter", "passing"};
-    figure.panels = {{"", "mass passing [%]", 100, false, {{"passing", ""}}}};
-    for (const CaseData& data : cases)
-        for (std::size_t i = 0; i < data.psd_diameter.size(); ++i)
-            if (data.psd_diameter[i] > 0) figure.table.add({data.name, data.psd_diameter[i], number_cell(data.psd_passing[i])});
     return figure;
 }
 
 }  // namespace
 
-std::vector<Figure> make_figures(const std::vector<CaseData>& cases)
+bool detail::has_fines(const CaseData& data)
 {
+    const Series* fines = data.find("fines_count");
+    const Series* eroded = data.find("eroded_mass_fraction");
+    const auto any = [](const Series* series) { return series && std::ranges::any_of(series->values, [](double v) { return v > 0; }); };
+    return !fines || any(fines) || any(eroded);
+}
+
+std::vector<Figure> make_figures(const std::vector<CaseData>& runs)
+{
+    const std::vector<CaseData> cases = pool_repeats(runs);
     std::vector<Figure> figures;
     for (const TimeFigure& spec : time_figures()) figures.push_back(make_time_figure(spec, cases));
-    figures.insert(figures.begin() + 1, make_layer_bars(cases));
-    figures.push_back(make_migration(cases));
-    figures.push_back(make_top_layer(cases));
-    figures.push_back(make_speeds(cases));
-    figures.push_back(make_gradation(cases));
+    figures.insert(figures.begin() + 2, detail::layer_bars(cases));
+    for (Figure& figure : detail::migration_figures(cases)) figures.push_back(std::move(figure));
+    figures.push_back(detail::fine_paths(cases));
+    figures.push_back(detail::fine_speeds(cases));
+    figures.push_back(detail::trapped_by_grain(cases));
+    figures.push_back(detail::gradation(cases));
+    figures.push_back(detail::stability_table(cases));
     for (Figure& figure : figures) keep_drawable(figure);
     std::erase_if(figures, [](const Figure& figure) { return figure.panels.empty(); });
     return figures;
@@ -300,7 +208,7 @@ Table erosion_table(const std::vector<CaseData>& cases)
     // Columns in the order of the figures first, so that the file opens on what users look for; then the rest by name.
     std::vector<std::string> columns;
     const auto offer = [&](const std::string& column) {
-        const bool there = std::ranges::any_of(cases, [&](const CaseData& data) { return find_column(data, column).series != nullptr; });
+        const bool there = std::ranges::any_of(cases, [&](const CaseData& data) { return find_column(data.series, column).series != nullptr; });
         if (there && std::ranges::find(columns, column) == columns.end()) columns.push_back(column);
     };
     offer("eroded_mass_fraction");
@@ -317,10 +225,10 @@ Table erosion_table(const std::vector<CaseData>& cases)
     table.columns.insert(table.columns.end(), columns.begin(), columns.end());
     for (const CaseData& data : cases) {
         std::vector<Source> sources;
-        for (const std::string& column : columns) sources.push_back(find_column(data, column));
+        for (const std::string& column : columns) sources.push_back(find_column(data.series, column));
         for (std::size_t i = 0; i < data.time.size(); ++i) {
             std::vector<Cell> row{data.name, data.time[i]};
-            for (const Source& s : sources) row.push_back(number_cell(s.series ? s.series->at(i, s.component) : nan_value));
+            for (const Source& s : sources) row.push_back(number_cell(s.at(i)));
             table.add(std::move(row));
         }
     }

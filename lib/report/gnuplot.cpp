@@ -14,6 +14,7 @@
 #include "core/text.h"
 #include "report/detail/page_data.h"
 #include "report/figure.h"
+#include "report/summary.h"
 
 extern char** environ;
 
@@ -24,7 +25,7 @@ namespace fs = std::filesystem;
 
 constexpr auto& palette = detail::curve_colours;
 constexpr std::array<int, 7> markers{7, 5, 9, 13, 11, 4, 6};
-constexpr std::array<const char*, 4> dashes{"1", "2", "4", "3"};
+constexpr std::array<const char*, 4> dashes{"1", "(5,2)", "(1.5,1.5)", "(6,2,1.5,2)"};  // gnuplot's own leave holes wider than dashes in thick lines
 
 /// Text in single quotes, where gnuplot reads nothing but a doubled quote.
 std::string quoted(const std::string& text)
@@ -53,6 +54,12 @@ std::vector<double> values_of(const Figure& figure, std::size_t column, const st
     return values;
 }
 
+/// Cases that a panel draws.
+std::vector<std::string> shown_cases(const Figure& figure, const Panel& panel)
+{
+    return panel.only_case.empty() ? figure.cases : std::vector<std::string>{panel.only_case};
+}
+
 struct Range {
     double low = HUGE_VAL, high = -HUGE_VAL, smallest_positive = HUGE_VAL;
 };
@@ -61,7 +68,7 @@ Range range_of(const Figure& figure, const Panel& panel)
 {
     Range range;
     for (const Curve& curve : panel.curves)
-        for (const std::string& name : figure.cases)
+        for (const std::string& name : shown_cases(figure, panel))
             for (double v : values_of(figure, column_of(figure, curve.column), name)) {
                 range.low = std::min(range.low, v);
                 range.high = std::max(range.high, v);
@@ -86,7 +93,7 @@ std::string x_ticks(const Figure& figure)
             low = std::min(low, *x * figure.x_factor);
             high = std::max(high, *x * figure.x_factor);
         }
-    if (figure.kind == FigureKind::bars || figure.x_logarithmic || !(high > low)) return {};
+    if (figure.kind == FigureKind::bars || figure.kind == FigureKind::paths || figure.x_logarithmic || !(high > low)) return {};
     return "  set xtics " + to_text(tick_step(high - low)) + "\n";
 }
 
@@ -110,49 +117,98 @@ std::string scaled(std::size_t column, double factor, bool absolute)
 
 std::string title_of(const Figure& figure, const std::string& name, const Curve& curve)
 {
-    if (figure.cases.size() == 1) return curve.label;
+    if (figure.cases.size() == 1 || name.empty()) return curve.label;
     return curve.label.empty() ? name : name + ", " + curve.label;
+}
+
+/// `data ... using` for the rows of one case, with the abscissa in place.
+std::string rows_of(const Figure& figure, const std::string& name, std::size_t x_column)
+{
+    return "data skip 1 using (strcol(1) eq " + quoted(name) + " ? " + scaled(x_column, figure.x_factor, false) + " : NaN)";
+}
+
+/// Bands first, so that no curve is hidden; they have no place in the legend.
+std::string plot_bands(const Figure& figure, const Panel& panel, bool logarithmic, bool& first)
+{
+    std::string text;
+    const std::vector<std::string> cases = shown_cases(figure, panel);
+    for (std::size_t k = 0; k < cases.size(); ++k)
+        for (std::size_t c = 0; c < panel.curves.size(); ++c) {
+            const Curve& curve = panel.curves[c];
+            if (curve.low.empty() || values_of(figure, column_of(figure, curve.low), cases[k]).empty()) continue;
+            const std::size_t look = cases.size() == 1 ? c : k;
+            text += std::string(first ? " " : ", \\\n       ") + rows_of(figure, cases[k], 1) + ":(" + scaled(column_of(figure, curve.low), panel.factor, logarithmic) + "):(" +
+                    scaled(column_of(figure, curve.high), panel.factor, logarithmic) + ") with filledcurves fs transparent solid 0.2 noborder lc rgb '" +
+                    palette[look % palette.size()] + "' notitle";
+            first = false;
+        }
+    return text;
 }
 
 std::string plot_curves(const Figure& figure, const Panel& panel, bool logarithmic)
 {
-    std::string text = "  plot";
     bool first = true;
-    for (std::size_t k = 0; k < figure.cases.size(); ++k)
+    std::string text = "  plot" + plot_bands(figure, panel, logarithmic, first);
+    const std::vector<std::string> cases = shown_cases(figure, panel);
+    for (std::size_t k = 0; k < cases.size(); ++k)
         for (std::size_t c = 0; c < panel.curves.size(); ++c) {
-            const std::size_t column = column_of(figure, panel.curves[c].column);
-            const auto values = values_of(figure, column, figure.cases[k]);
-            const bool drawable = std::ranges::any_of(values, [&](double v) { return !logarithmic || v != 0; });
-            if (!drawable) continue;
-            const std::size_t look = figure.cases.size() == 1 ? c : k;
-            const std::string title = title_of(figure, figure.cases[k], panel.curves[c]);
-            text += std::string(first ? " " : ", \\\n       ") + "data skip 1 using (strcol(1) eq " + quoted(figure.cases[k]) + " ? " +
-                    scaled(1, figure.x_factor, false) + " : NaN):(" + scaled(column, panel.factor, logarithmic) + ")" +
-                    (figure.kind == FigureKind::steps ? " with steps" : " with linespoints") + " lw 2 lc rgb '" + palette[look % palette.size()] +
-                    "' dt " + dashes[(figure.cases.size() == 1 ? 0 : c) % dashes.size()];
-            if (figure.kind == FigureKind::lines)
-                text += " pt " + std::to_string(markers[look % markers.size()]) + " ps 0.7 pi " + std::to_string(std::max<std::size_t>(1, values.size() / 10));
+            const Curve& curve = panel.curves[c];
+            const std::size_t column = column_of(figure, curve.column);
+            const auto values = values_of(figure, column, cases[k]);
+            if (std::ranges::none_of(values, [&](double v) { return !logarithmic || v != 0; })) continue;
+            const std::size_t look = cases.size() == 1 ? c : k;
+            const std::string title = title_of(figure, panel.only_case.empty() ? cases[k] : std::string(), curve);
+            const bool lines = figure.kind == FigureKind::lines || figure.kind == FigureKind::paths;
+            text += std::string(first ? " " : ", \\\n       ") + rows_of(figure, cases[k], curve.x_column.empty() ? 1 : column_of(figure, curve.x_column)) + ":(" +
+                    scaled(column, panel.factor, logarithmic) + ")" + (lines ? " with linespoints" : " with steps") + " lw 2 lc rgb '" + palette[look % palette.size()] +
+                    "' dt " + dashes[(cases.size() == 1 ? 0 : c) % dashes.size()];
+            if (lines) text += " pt " + std::to_string(markers[look % markers.size()]) + " ps 0.7 pi " + std::to_string(std::max<std::size_t>(1, values.size() / 10));
             text += title.empty() ? " notitle" : " title " + quoted(title);
             first = false;
         }
     return text + "\n";
 }
 
-/// Clustered bars: for each layer one place per case, the start outlined and the end filled.
-std::string plot_bars(const Figure& figure)
+/// Clustered bars: for each category one place per case, the first curve outlined and the second filled, with its band as a line.
+std::string plot_bars(const Figure& figure, const Panel& panel)
 {
-    std::string text = "  set xtics ('bottom' 0, 'middle' 1, 'top' 2)\n  set xrange [-0.6:2.6]\n  plot";
+    std::string text = "  set xtics (";
+    for (std::size_t i = 0; i < figure.categories.size(); ++i) text += (i ? ", " : "") + quoted(figure.categories[i]) + " " + std::to_string(i);
+    text += ")\n  set xrange [-0.6:" + to_text(static_cast<double>(figure.categories.size()) - 0.4) + "]\n  plot";
     const double width = 0.8 / static_cast<double>(figure.cases.size());
     for (std::size_t k = 0; k < figure.cases.size(); ++k) {
         const double shift = (static_cast<double>(k) - 0.5 * static_cast<double>(figure.cases.size() - 1)) * width;
         const std::string where = "data skip 1 using (strcol(1) eq " + quoted(figure.cases[k]) + " ? $2+(" + to_text(shift) + ") : NaN)";
         const std::string colour = std::string(" lc rgb '") + palette[k % palette.size()] + "'";
         const std::string name = figure.cases.size() == 1 ? std::string() : figure.cases[k] + ", ";
-        const std::string box = ":(" + to_text(0.92 * width) + ") with boxes";
-        text += std::string(k == 0 ? " " : ", \\\n       ") + where + ":3" + box + " fs empty lw 1.5" + colour + " title " + quoted(name + "start") + ", \\\n       " +
-                where + ":4" + box + " fs solid 0.7 noborder" + colour + " title " + quoted(name + "end");
+        for (std::size_t c = 0; c < panel.curves.size(); ++c) {
+            const Curve& curve = panel.curves[c];
+            const std::string column = std::to_string(column_of(figure, curve.column) + 1);
+            text += std::string(k + c == 0 ? " " : ", \\\n       ") + where + ":" + column + ":(" + to_text(0.92 * width) + ") with boxes fs " +
+                    (c == 0 ? "empty lw 1.5" : "solid 0.7 noborder") + colour + " title " + quoted(name + curve.label);
+            if (curve.low.empty()) continue;
+            text += ", \\\n       " + where + ":" + column + ":" + std::to_string(column_of(figure, curve.low) + 1) + ":" + std::to_string(column_of(figure, curve.high) + 1) +
+                    " with yerrorbars pt 0 lw 1.5 lc rgb '#222222' notitle";
+        }
     }
     return text + "\n";
+}
+
+/// The table as text in columns.
+std::string plot_table(const Figure& figure)
+{
+    const std::size_t rows = figure.table.rows.size(), columns = figure.table.columns.size();
+    std::string text = "  unset border; unset tics; unset xlabel; unset ylabel; unset grid\n  set xrange [0:1]; set yrange [" + to_text(static_cast<double>(rows) + 0.7) + ":-0.7]\n";
+    const auto place = [&](const std::string& what, std::size_t row, std::size_t column, const char* font) {
+        return "  set label " + quoted(what) + " at " + to_text((static_cast<double>(column) + 0.1) / static_cast<double>(columns)) + "," + to_text(static_cast<double>(row)) + " noenhanced" + font + "\n";
+    };
+    for (std::size_t c = 0; c < columns; ++c) text += place(figure.table.columns[c], 0, c, " font ',14'");
+    for (std::size_t r = 0; r < rows; ++r)
+        for (std::size_t c = 0; c < columns; ++c) {
+            const Cell& cell = figure.table.rows[r][c];
+            text += place(std::holds_alternative<double>(cell) ? short_number(std::get<double>(cell)) : std::get<std::string>(cell), r + 1, c, "");
+        }
+    return text + "  set arrow from 0,0.5 to 1,0.5 nohead lc rgb '#888888'\n  plot NaN notitle\n  unset label; unset arrow\n";
 }
 
 /// Runs gnuplot in `folder`; its messages end up in the error.
@@ -191,7 +247,8 @@ std::string gnuplot_script(const Figure& figure)
 {
     const std::size_t panels = figure.panels.size();
     const bool wide = panels > 1;
-    const std::size_t width = wide ? 400 * panels : 600, height = wide ? 420 : 410;
+    const bool table = figure.kind == FigureKind::table;
+    const std::size_t width = wide ? 400 * panels : table ? 800 : 600, height = wide ? 420 : table ? 110 + 24 * figure.table.rows.size() : 410;
     std::string text = "# " + figure.title + ". Redraw with: gnuplot " + figure.name + ".gp\n" +
                        "# erosion-report writes this file anew each time; copy the folder to restyle figures for a journal.\n"
                        "data = " + quoted(figure.name + ".csv") + "  # ";
@@ -212,10 +269,11 @@ std::string gnuplot_script(const Figure& figure)
     text += "  set xlabel " + quoted(figure.x_label) + " noenhanced offset 0,0.4\n" + x_ticks(figure);
     for (const Panel& panel : figure.panels) {
         bool logarithmic = false;
-        const std::string& title = wide ? panel.title : figure.title;
+        const std::string& title = wide ? panel.title : figure.title;  // of one panel, the case is clear
         text += "  set title " + quoted(title) + " noenhanced" + (wide ? "" : " font ',15'") + "\n  set ylabel " + quoted(panel.y_label) + " noenhanced\n" +
                 y_axis(figure, panel, logarithmic);
-        text += figure.kind == FigureKind::bars ? plot_bars(figure) : plot_curves(figure, panel, logarithmic);
+        if (figure.kind == FigureKind::paths) text += "  set size ratio -1\n";
+        text += figure.kind == FigureKind::bars ? plot_bars(figure, panel) : table ? plot_table(figure) : plot_curves(figure, panel, logarithmic);
     }
     if (wide) text += "  unset multiplot\n";
     return text + "}\nunset output\n";

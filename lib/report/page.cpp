@@ -7,6 +7,8 @@
 #include "core/output_file.h"
 #include "report/detail/encode.h"
 #include "report/detail/page_data.h"
+#include "report/detail/pictures.h"
+#include "report/pool.h"
 #include "report/scene.h"
 #include "report/summary.h"
 
@@ -55,9 +57,41 @@ std::string compare_table(const std::vector<CaseData>& cases, const std::vector<
     return text + "</table></div>\n" + (cases.size() > 1 ? "<p class=\"soft\">Shaded rows differ between the cases.</p>\n" : "");
 }
 
+/// Eroded mass of repeats: mean, standard deviation and range.
+std::string spread_lines(const std::vector<CaseData>& cases)
+{
+    std::string text;
+    for (const CaseData& pooled : pool_repeats(cases)) {
+        if (pooled.repeats < 2) continue;
+        double sum = 0, squares = 0, low = HUGE_VAL, high = -HUGE_VAL;
+        for (const CaseData& data : cases) {
+            if (data.label != pooled.label) continue;
+            const double eroded = 100 * summarise(data).eroded_mass_fraction;
+            sum += eroded;
+            squares += eroded * eroded;
+            low = std::min(low, eroded);
+            high = std::max(high, eroded);
+        }
+        const double n = static_cast<double>(pooled.repeats), mean = sum / n, deviation = std::sqrt(std::max(0.0, squares - n * mean * mean) / (n - 1));
+        text += "<p><strong>" + html(pooled.label) + "</strong>: " + short_number(mean, 3) + " % of the fines' mass eroded, mean of " + std::to_string(pooled.repeats) +
+                " packings; standard deviation " + short_number(deviation, 2) + " %, range " + short_number(low, 3) + " to " + short_number(high, 3) + " %.</p>\n";
+    }
+    return text;
+}
+
+std::string pictures_section(const std::vector<detail::NamedPicture>& pictures, const fs::path& folder)
+{
+    if (pictures.empty()) return {};
+    std::string text = section("pictures", "Samples and flow") + "<div class=\"pictures\">\n";
+    for (const detail::NamedPicture& picture : pictures)
+        text += "<figure><img alt=\"" + html(picture.title) + "\" src=\"data:image/png;base64," + detail::base64(read_text_file(folder / picture.file)) + "\">\n<figcaption><strong>" +
+                html(picture.title) + ".</strong> " + html(picture.caption) + "</figcaption></figure>\n";
+    return text + "</div>\n</section>\n";
+}
+
 std::string verdict_section(const std::vector<CaseData>& cases)
 {
-    std::string text = "<div class=\"verdict\">\n", warnings;
+    std::string text = "<div class=\"verdict\">\n" + spread_lines(cases), warnings;
     for (const CaseData& data : cases) {
         const Summary summary = summarise(data);
         text += "<p><strong>" + html(data.name) + "</strong>: " + html(verdict(summary)) + "</p>\n";
@@ -76,8 +110,8 @@ std::string figures_section(const std::vector<Figure>& figures, const fs::path& 
         const bool as_svg = svg.size() < 300000 || fs::file_size(folder / (figure.name + ".png")) > svg.size();
         const std::string picture = as_svg ? "data:image/svg+xml;base64," + detail::base64(svg)
                                            : "data:image/png;base64," + detail::base64(read_text_file(folder / (figure.name + ".png")));
-        text += std::string("<figure") + (figure.panels.size() > 1 ? " class=\"wide\"" : "") + "><img alt=\"" + html(figure.title) + "\" src=\"" + picture +
-                "\">\n<figcaption>" + html(figure.caption) + " <span class=\"soft\">figures/" + figure.name + ".csv</span></figcaption></figure>\n";
+        text += std::string("<figure") + (figure.panels.size() > 1 || figure.kind == FigureKind::table ? " class=\"wide\"" : "") + "><img alt=\"" + html(figure.title) + "\" src=\"" + picture +
+                "\">\n<figcaption>" + html(figure.caption) + " <a class=\"soft\" href=\"figures/" + figure.name + ".csv\">figures/" + figure.name + ".csv</a></figcaption></figure>\n";
     }
     return text + "</div>\n<p class=\"soft\">Numbers in brackets are the figures of Huang et al. that these answer. Each picture lies in figures/ as SVG and PNG, "
                   "with its numbers (csv) and the gnuplot script that draws it.</p>\n</section>\n";
@@ -141,9 +175,10 @@ std::string balance_section(const std::vector<CaseData>& cases)
                                   {"Greatest momentum balance error", with_unit(s.momentum_error, "momentum_balance_error")}};
         const Series* fines = data.find("fines_count");
         const Series* eroded = data.find("eroded_count");
-        if (fines && eroded && fines->width == 3) {
+        if (fines && eroded) {
             const std::size_t last = fines->steps() - 1;
-            const double left = fines->at(last, 0) + fines->at(last, 1) + fines->at(last, 2);
+            double left = 0;
+            for (std::size_t layer = 0; layer < fines->width; ++layer) left += fines->at(last, layer);
             rows.push_back({"Fines in the layers + eroded, start", short_number(s.fines_at_start, 9)});
             rows.push_back({"Fines in the layers + eroded, end", short_number(left, 9) + " + " + short_number(eroded->at(last), 9) + " = " +
                                                                     short_number(left + eroded->at(last), 9)});
@@ -265,7 +300,7 @@ std::string scene_section(const std::vector<CaseData>& cases, const fs::path& li
 std::string data_link(const std::vector<CaseData>& cases)
 {
     const std::string csv = erosion_table(cases).to_csv();
-    if (csv.size() > 700000) return "<p class=\"soft\">All series of all cases lie in erosion.csv beside this page.</p>\n";
+    if (csv.size() > 700000) return "<p class=\"soft\">All series of all cases lie in <a href=\"erosion.csv\">erosion.csv</a> beside this page.</p>\n";
     return "<p><a download=\"erosion.csv\" href=\"data:text/csv;base64," + detail::base64(csv) + "\">All series as CSV</a></p>\n";
 }
 
@@ -280,10 +315,12 @@ std::string report_page(const std::vector<CaseData>& cases, const std::vector<Fi
                        "\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
                        "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'\">\n"
                        "<title>" + html(title) + "</title>\n<style>\n" + detail::page_css + "</style></head>\n<body>\n<h1>" + html(title) + "</h1>\n"
-                       "<nav><a href=\"#figures\">Figures</a><a href=\"#numbers\">Key figures</a><a href=\"#setup\">Set-up</a><a href=\"#criteria\">Stability</a>"
+                       "<nav><a href=\"#figures\">Figures</a><a href=\"#pictures\">Pictures</a><a href=\"#numbers\">Key figures</a><a href=\"#setup\">Set-up</a><a href=\"#criteria\">Stability</a>"
                        "<a href=\"#balances\">Balances</a><a href=\"#performance\">Performance</a><a href=\"#history\">History</a>"
                        "<a href=\"#curves-section\">Curves</a><a href=\"#view\">3-D</a></nav>\n";
-    page += verdict_section(cases) + data_link(cases) + figures_section(figures, figures_folder) + key_figures(cases) + setup_section(cases) + criteria_section(cases) +
+    const fs::path pictures_folder = figures_folder.parent_path() / "pictures";
+    const std::vector<detail::NamedPicture> pictures = detail::draw_pictures(cases, pictures_folder, notes);
+    page += verdict_section(cases) + data_link(cases) + figures_section(figures, figures_folder) + pictures_section(pictures, pictures_folder) + key_figures(cases) + setup_section(cases) + criteria_section(cases) +
             balance_section(cases) + performance_section(cases) + history_section(cases, options.record);
     page += curves_section(figures, options.libraries, notes);
     page += scene_section(cases, options.libraries, notes);

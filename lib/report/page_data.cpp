@@ -32,7 +32,8 @@ ordered_json panel_json(const Figure& figure, const Panel& panel)
     };
     const std::size_t width = figure.cases.size() * panel.curves.size();
     std::map<double, std::vector<ordered_json>> rows;
-    ordered_json out{{"title", panel.title}, {"y_label", panel.y_label}, {"logarithmic", panel.logarithmic}};
+    const bool banded = std::ranges::any_of(panel.curves, [](const Curve& curve) { return !curve.low.empty(); });
+    ordered_json out{{"title", panel.title}, {"y_label", panel.y_label}, {"logarithmic", panel.logarithmic}, {"banded", banded}};
     std::size_t place = 0;
     bool positive = false;
     for (std::size_t k = 0; k < figure.cases.size(); ++k) {
@@ -52,6 +53,14 @@ ordered_json panel_json(const Figure& figure, const Panel& panel)
                 auto& row = rows[std::get<double>((*of_case[i])[1])];
                 row.resize(width);
                 row[place] = rounded(drawn);
+                if (!banded) continue;
+                const Curve& curve = panel.curves[c];
+                ordered_json ends = ordered_json::array();
+                for (const std::string& end : {curve.low, curve.high}) {
+                    const double* other = end.empty() ? nullptr : std::get_if<double>(&(*of_case[i])[column_of(end)]);
+                    ends.push_back(rounded(panel.factor * (other ? (panel.logarithmic ? std::abs(*other) : *other) : *value)));
+                }
+                row[place] = {ends[0], rounded(drawn), ends[1]};
             }
             const std::size_t look = figure.cases.size() == 1 ? c : k;
             std::string label = panel.curves[c].label;

@@ -6,6 +6,7 @@
 #include "core/error.h"
 #include "core/formats.h"
 #include "core/hdf5.h"
+#include "dem/polyhedron.h"
 #include "report/detail/read.h"
 
 namespace coral::report::detail {
@@ -101,6 +102,25 @@ Lattice read_lattice(const std::filesystem::path& sample, std::int64_t shape)
     lattice.spacing = file.number_attribute(path, "spacing");
     lattice.distance = file.read_floats(path);
     return lattice;
+}
+
+Mesh read_polyhedron(const std::filesystem::path& sample, std::int64_t shape)
+{
+    Mesh mesh;
+    const H5File file = H5File::open(sample);
+    const std::string path = "/shapes/" + std::to_string(shape) + "/vertices";
+    if (!file.exists(path)) return mesh;
+    const auto numbers = file.read_doubles(path);
+    std::vector<Eigen::Vector3d> points;
+    for (std::size_t i = 0; i + 2 < numbers.size(); i += 3) points.emplace_back(numbers[i], numbers[i + 1], numbers[i + 2]);
+    const dem::Polyhedron polyhedron(points, path);
+    // Corners of their own for every face, so that edges stay sharp where normals are averaged.
+    for (const std::vector<int>& face : polyhedron.faces()) {
+        const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
+        for (const int v : face) mesh.vertices.push_back(polyhedron.vertices()[static_cast<std::size_t>(v)]);
+        for (std::uint32_t k = 2; k < face.size(); ++k) mesh.triangles.push_back({first, first + k - 1, first + k});
+    }
+    return mesh;
 }
 
 void read_history(const H5File& file, CaseData& data)

@@ -32,7 +32,7 @@ void require_replaceable(const fs::path& folder)
     if (fs::is_empty(folder)) return;
     for (const auto& entry : fs::directory_iterator(folder)) {
         const std::string name = entry.path().filename().string();
-        const bool ours = name == "figures" ? entry.is_directory() : (name == "erosion.csv" || name == "report.html") && entry.is_regular_file();
+        const bool ours = name == "figures" || name == "pictures" ? entry.is_directory() : (name == "erosion.csv" || name == "report.html") && entry.is_regular_file();
         if (!ours) refuse("it holds " + name + ", which is not of a report");
     }
     if (!fs::exists(folder / "report.html")) refuse("it holds no report.html of an earlier report");
@@ -47,6 +47,10 @@ void require_replaceable(const fs::path& folder)
             if (!entry.is_regular_file() || !kinds.contains(entry.path().extension().string()) ||
                 !fs::exists(fs::path(entry.path()).replace_extension(".gp")))
                 refuse("it holds figures/" + entry.path().filename().string() + ", which is not of a report");
+    if (fs::exists(folder / "pictures"))
+        for (const auto& entry : fs::directory_iterator(folder / "pictures"))
+            if (!entry.is_regular_file() || entry.path().extension() != ".png" || !entry.path().filename().string().starts_with("case"))
+                refuse("it holds pictures/" + entry.path().filename().string() + ", which is not of a report");
 }
 
 /// Folder beside the target, removed again unless move_into_place() was reached.

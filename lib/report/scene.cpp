@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <set>
 #include <nlohmann/json.hpp>
 
 #include "report/detail/encode.h"
@@ -113,39 +114,50 @@ struct Cast {
     }
 };
 
-Cast cast_bodies(const CaseData& data, const std::map<std::int64_t, Lattice>& lattices)
+/// Shapes that are drawn as meshes: level sets, harmonics and superellipsoids by their lattices, polyhedra by their faces.
+struct Shapes {
+    std::map<std::int64_t, Lattice> lattices;
+    std::map<std::int64_t, Mesh> polyhedra;
+    std::map<std::int64_t, std::size_t> place;  ///< of a shape among the meshes
+};
+
+Cast cast_bodies(const CaseData& data, const Shapes& shapes)
 {
     Cast cast;
     for (std::size_t column = 0; column < data.tracks.id.size(); ++column) {
         const auto number = static_cast<std::size_t>(data.tracks.id[column]);
         if (number >= data.bodies.size()) continue;
         const Body& body = data.bodies[number];
-        if (body.role != "fine" && lattices.contains(body.shape)) cast.grains.push_back(column);
+        if (shapes.place.contains(body.shape)) cast.grains.push_back(column);
         else if (body.diameter > 0) cast.spheres.push_back(column);
     }
     return cast;
 }
 
-std::map<std::int64_t, Lattice> lattices_in_use(const CaseData& data)
+Shapes shapes_in_use(const CaseData& data)
 {
-    std::map<std::int64_t, Lattice> lattices;
-    for (const Body& body : data.bodies)
-        if (body.role != "fine" && body.shape >= 0 && !data.sample.empty() && !lattices.contains(body.shape)) {
-            Lattice lattice = detail::read_lattice(data.sample, body.shape);
-            if (!lattice.distance.empty()) lattices.emplace(body.shape, std::move(lattice));
-        }
-    return lattices;
+    Shapes shapes;
+    std::set<std::int64_t> known;
+    for (const Body& body : data.bodies) {
+        if (body.shape < 0 || data.sample.empty() || !known.insert(body.shape).second) continue;
+        Lattice lattice = detail::read_lattice(data.sample, body.shape);
+        if (!lattice.distance.empty()) shapes.lattices.emplace(body.shape, std::move(lattice));
+        else if (Mesh mesh = detail::read_polyhedron(data.sample, body.shape); !mesh.triangles.empty()) shapes.polyhedra.emplace(body.shape, std::move(mesh));
+    }
+    for (const auto& entry : shapes.lattices) shapes.place.emplace(entry.first, shapes.place.size());
+    for (const auto& entry : shapes.polyhedra) shapes.place.emplace(entry.first, shapes.place.size());
+    return shapes;
 }
 
-/// Layer (0 bottom, 1 middle, 2 top) that each sphere started in, 3 for bodies that are no fines.
-ordered_json groups_of(const CaseData& data, const std::vector<std::size_t>& spheres)
+/// Third of the layers (0 bottom, 1 middle, 2 top) that each body started in, 3 for bodies that are no fines.
+ordered_json groups_of(const CaseData& data, const std::vector<std::size_t>& columns)
 {
     std::map<std::int64_t, std::int64_t> layer_of;
     for (std::size_t i = 0; i < data.migration.layer.size(); ++i) layer_of[data.migration.id[i]] = data.migration.layer[i];
     ordered_json groups = ordered_json::array();
-    for (std::size_t column : spheres) {
+    for (std::size_t column : columns) {
         const auto it = layer_of.find(data.tracks.id[column]);
-        groups.push_back(it == layer_of.end() || data.bodies[static_cast<std::size_t>(it->first)].role != "fine" ? 3 : std::clamp<std::int64_t>(it->second, 0, 2));
+        groups.push_back(it == layer_of.end() || data.bodies[static_cast<std::size_t>(it->first)].role != "fine" ? 3 : std::clamp<std::int64_t>(3 * it->second / static_cast<std::int64_t>(std::max<std::size_t>(1, data.layers)), 0, 2));
     }
     return groups;
 }
@@ -166,9 +178,10 @@ void bounds(const Tracks& tracks, Vector3d& low, Vector3d& extent)
     extent = (high - low).cwiseMax(1e-9);
 }
 
-/// Meshes of the lattices in map order; returns the finest and coarsest spacing used.
-std::pair<double, double> pack_meshes(const std::map<std::int64_t, Lattice>& lattices, const SceneLimits& limits, Packed& packed)
+/// Meshes of the lattices in map order, then the polyhedra; returns the finest and coarsest spacing used.
+std::pair<double, double> pack_meshes(const Shapes& shapes, const SceneLimits& limits, Packed& packed)
 {
+    const auto& lattices = shapes.lattices;
     double finest = HUGE_VAL, coarsest = 0;
     for (const auto& [shape, lattice] : lattices) {
         double spacing = mesh_spacing(lattice, lattices.size(), limits);
@@ -178,6 +191,7 @@ std::pair<double, double> pack_meshes(const std::map<std::int64_t, Lattice>& lat
         coarsest = std::max(coarsest, spacing);
         pack_mesh(mesh, packed);
     }
+    for (const auto& entry : shapes.polyhedra) pack_mesh(entry.second, packed);
     return {finest, coarsest};
 }
 
@@ -196,21 +210,21 @@ std::string scene_json(const CaseData& data, const SceneLimits& limits, std::str
         note = "The run kept no trajectories, so there is no 3-D view.";
         return {};
     }
-    const std::map<std::int64_t, Lattice> lattices = lattices_in_use(data);
-    const Cast cast = cast_bodies(data, lattices);
+    const Shapes shapes = shapes_in_use(data);
+    const Cast cast = cast_bodies(data, shapes);
     const std::vector<std::size_t> order = cast.order();
     if (order.empty()) {
         note = "The sizes of the bodies are not known (no sample.h5, no diameters in case.toml), so there is no 3-D view.";
         return {};
     }
-    const std::vector<std::size_t> frames = pick_frames(data.tracks.time.size(), order.size(), limits);
+    const std::vector<std::size_t> frames = pick_frames(data.tracks.time.size(), order.size() + 4 * cast.grains.size() / 3, limits);
     Vector3d low, extent;
     bounds(data.tracks, low, extent);
 
     Packed packed;
     pack_positions(data.tracks, order, frames, low, extent, packed);
     pack_orientations(data.tracks, cast.grains, frames, packed);
-    const auto [finest, coarsest] = pack_meshes(lattices, limits, packed);
+    const auto [finest, coarsest] = pack_meshes(shapes, limits, packed);
 
     ordered_json scene;
     scene["case"] = data.name;
@@ -227,9 +241,10 @@ std::string scene_json(const CaseData& data, const SceneLimits& limits, std::str
     scene["grain_scale"] = ordered_json::array();
     for (std::size_t column : cast.grains) {
         const Body& body = data.bodies[static_cast<std::size_t>(data.tracks.id[column])];
-        scene["grain_mesh"].push_back(std::distance(lattices.begin(), lattices.find(body.shape)));
+        scene["grain_mesh"].push_back(shapes.place.at(body.shape));
         scene["grain_scale"].push_back(body.scale);
     }
+    scene["grain_group"] = groups_of(data, cast.grains);
     scene["sphere_radius"] = ordered_json::array();
     for (std::size_t column : cast.spheres)
         scene["sphere_radius"].push_back(static_cast<float>(0.5 * data.bodies[static_cast<std::size_t>(data.tracks.id[column])].diameter));
@@ -238,9 +253,9 @@ std::string scene_json(const CaseData& data, const SceneLimits& limits, std::str
     scene["words"] = packed.words.size();
     scene["data"] = detail::base64(detail::deflate_words(packed.words));
 
-    note = std::to_string(cast.grains.size()) + " grains as meshes";
-    if (!lattices.empty())
-        note += " of their level sets (coarsened for viewing to " + millimetres(finest) + (coarsest > 1.01 * finest ? " to " + millimetres(coarsest) : "") + ")";
+    note = std::to_string(cast.grains.size()) + " bodies in their shapes";
+    if (!shapes.lattices.empty())
+        note += " (lattices coarsened for viewing to " + millimetres(finest) + (coarsest > 1.01 * finest ? " to " + millimetres(coarsest) : "") + ")";
     note += ", " + std::to_string(cast.spheres.size()) + " other bodies as spheres of their equivalent diameter, " + std::to_string(frames.size()) + " of " +
             std::to_string(data.tracks.time.size()) + " stored times.";
     return scene.dump();

@@ -16,7 +16,8 @@ struct SceneLimits {
 };
 
 /// JSON object for the viewer (web/viewer.js reads it), or empty when the case has no tracked positions or no sizes of bodies.
-/// Grains with a distance lattice are meshes (surface_mesh.h), every other body is a sphere of its equivalent diameter.
+/// Bodies whose shape has a distance lattice are meshes of it (surface_mesh.h), polyhedra are their faces, every other body is a sphere of its
+/// equivalent diameter.
 /// Numbers are 16 bit, coded as differences, split into byte planes, deflated and written in base64.
 /// \param note  set to a sentence that says what is shown and how coarse, or why nothing is
 std::string scene_json(const CaseData& data, const SceneLimits& limits, std::string& note);

@@ -58,9 +58,11 @@ double least_after(const CaseData& data, const std::string& name, double from)
 double counted_fines(const CaseData& data, std::size_t step)
 {
     const Series* fines = data.find("fines_count");
-    if (!fines || fines->width != 3) return unknown;
+    if (!fines) return unknown;
     const Series* eroded = data.find("eroded_count");
-    return fines->at(step, 0) + fines->at(step, 1) + fines->at(step, 2) + (eroded ? eroded->at(step) : 0);
+    double count = eroded ? eroded->at(step) : 0;
+    for (std::size_t layer = 0; layer < fines->width; ++layer) count += fines->at(step, layer);
+    return count;
 }
 
 void warn(const CaseData& data, Summary& summary)
@@ -76,6 +78,11 @@ void warn(const CaseData& data, Summary& summary)
     }
     const double kinetic = last_of(data, "kinetic_energy");
     if (data.find("kinetic_energy") && !std::isfinite(kinetic)) summary.warnings.push_back("The kinetic energy is not finite at the end: the run diverged.");
+    const double sealed = median_between(data, "velocity_sealed", 0.5 * summary.end_time, summary.end_time);
+    const double between = median_between(data, "velocity_interparticle", 0.5 * summary.end_time, summary.end_time);
+    if (sealed > 0.2 * between)
+        summary.warnings.push_back("Water moves at " + short_number(100 * sealed / between, 2) + " % of the speed between the grains in voids that have no way out, where it should be at rest: "
+                                   "walls in the grains are too thin for the flow cells, and the velocity inside grains is overstated. A finer --cell helps; a wall needs 1.5 cells.");
     if (summary.mass_error > 1e-3 && data.find("mass_balance_error")->unit == "1")
         summary.warnings.push_back("The mass balance is off by up to " + short_number(summary.mass_error, 2) + " (relative).");
     if (summary.momentum_error > 1e-2 && data.find("momentum_balance_error")->unit == "1")

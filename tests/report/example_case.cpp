@@ -209,7 +209,7 @@ void write_example_case(const std::filesystem::path& folder, const ExampleCase& 
     h5.set_attribute("/performance/cells_per_second", "unit", "1/s");
     const History history{{"pack-sample", "0.1.0", {{"seed", "3"}}, {"spec.toml"}}, {"suffuse", "0.1.0", {{"until", "2 s"}}, {"case"}}};
     h5.set_attribute("/", "history", to_json(history));
-    h5.set_attribute("/", "case", std::string(case_text));
+    h5.write("/case", std::vector<std::string>{case_text});
     h5.commit();
 }
 

@@ -96,6 +96,22 @@ TEST(DrawFigures, draws_svg_and_png_of_every_figure_with_odd_names)
     EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder), {}), static_cast<std::ptrdiff_t>(4 * figures.size()));
 }
 
+TEST(DrawFigures, curves_of_a_case_with_an_odd_name_are_drawn)
+{
+    const ScratchFolder scratch;
+    write_example_case(scratch.path() / "it's \"odd\", <b>");
+    write_example_case(scratch.path() / "plain");
+    const auto folder = scratch.path() / "drawn";
+    std::filesystem::create_directories(folder);
+    const auto size_of = [&](const std::string& name) {
+        const auto figures = make_figures(read_cases({scratch.path() / name}));
+        draw_figures({find(figures, "eroded_mass")}, folder);
+        return std::filesystem::file_size(folder / "eroded_mass.svg");
+    };
+    // One case has no legend, so the pictures are equal; without its curve the odd one would be far smaller.
+    EXPECT_EQ(size_of("it's \"odd\", <b>"), size_of("plain"));
+}
+
 TEST(GnuplotScript, draws_constant_zero_and_series_that_are_zero_on_a_log_axis)
 {
     const ScratchFolder scratch;

@@ -15,6 +15,8 @@ void read_history(const H5File& file, CaseData& data);
 void read_case_text(CaseData& data);
 /// Bodies, criteria and PSD of sample.h5; puts its bodies in front of those of case.toml.
 void read_sample(const std::filesystem::path& file, CaseData& data);
+/// Triangles of `/shapes/<shape>` when it is a polyhedron, about its centre of mass; empty otherwise.
+Mesh read_polyhedron(const std::filesystem::path& sample, std::int64_t shape);
 /// Distance lattice of `/shapes/<shape>`; without distances when the shape has none (a sphere).
 Lattice read_lattice(const std::filesystem::path& sample, std::int64_t shape);
 

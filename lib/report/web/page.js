@@ -35,6 +35,8 @@
                 labels: ["time"].concat(panel.labels),
                 series: series,
                 logscale: panel.logarithmic,
+                customBars: panel.banded,
+                highlightSeriesOpts: { strokeWidth: 3 },
                 includeZero: !panel.logarithmic,
                 xlabel: "time [s]",
                 ylabel: panel.y_label,

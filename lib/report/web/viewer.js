@@ -77,7 +77,7 @@
 
     function build(scene, words) {
         var grains = scene.grain_mesh.length, spheres = scene.sphere_radius.length, bodies = grains + spheres, frames = scene.times.length;
-        var made = { scene: scene, root: new THREE.Scene(), grains: [], groups: [], frames: frames, bodies: bodies };
+        var made = { scene: scene, root: new THREE.Scene(), groups: [], frames: frames, bodies: bodies };
         // Undo the differences between frames.
         made.positions = words.slice(0, frames * 3 * bodies);
         for (var i = 3 * bodies; i < made.positions.length; ++i) made.positions[i] += made.positions[i - 3 * bodies];
@@ -91,23 +91,28 @@
         sun.position.set(-1, -2, 3);
         made.root.add(sun);
         made.sand = new THREE.MeshLambertMaterial({ color: 0xE3CFA4, side: THREE.DoubleSide, clippingPlanes: [clip], transparent: true });
-        scene.grain_mesh.forEach(function (mesh, g) {
-            var grain = new THREE.Mesh(geometries[mesh], made.sand);
-            grain.scale.setScalar(scene.grain_scale[g]);
-            made.root.add(grain);
-            made.grains.push(grain);
+        // Bodies in their shapes: one set of instances for each mesh and colour.
+        function addGroup(geometry, group, members, turned) {
+            // Group 3 are grains: they fade with the slider, the fines stay.
+            var material = group === 3 ? made.sand : new THREE.MeshLambertMaterial({ color: layers[group], side: THREE.DoubleSide, clippingPlanes: [clip] });
+            var instances = new THREE.InstancedMesh(geometry, material, members.length);
+            instances.frustumCulled = false;
+            made.root.add(instances);
+            made.groups.push({ members: members, mesh: instances, turned: turned });
+        }
+        geometries.forEach(function (geometry, mesh) {
+            for (var group = 0; group < 4; ++group) {
+                var members = [];
+                scene.grain_mesh.forEach(function (of, g) { if (of === mesh && scene.grain_group[g] === group) members.push(g); });
+                // A geometry of its own: r111 keeps the matrices of the last group bound where two groups share one.
+                if (members.length > 0) addGroup(geometry.clone(), group, members, true);
+            }
         });
         for (var group = 0; group < 4; ++group) {
             var members = [];
             scene.sphere_group.forEach(function (of, s) { if (of === group) members.push(s); });
             if (members.length === 0) continue;
-            // Group 3 are grains that are spheres: they look and fade like the meshed ones.
-            var material = group === 3 ? made.sand : new THREE.MeshLambertMaterial({ color: layers[group], clippingPlanes: [clip] });
-            // A geometry of its own: r111 keeps the matrices of the last group bound where two groups share one.
-            var instances = new THREE.InstancedMesh(new THREE.SphereBufferGeometry(1, group === 3 ? 32 : 14, group === 3 ? 24 : 10), material, members.length);
-            instances.frustumCulled = false;
-            made.root.add(instances);
-            made.groups.push({ members: members, mesh: instances });
+            addGroup(new THREE.SphereBufferGeometry(1, group === 3 ? 32 : 14, group === 3 ? 24 : 10), group, members, false);
         }
         frameLines(made);
         return made;
@@ -149,17 +154,15 @@
             var q = made.positions[base + axis * made.bodies + b];
             return q === 65535 ? NaN : scene.low[axis] + scene.extent[axis] * q / 65534;
         }
-        made.grains.forEach(function (grain, g) {
-            var turn = function (c) { return made.turns[(frame * 4 + c) * made.grains.length + g] / 32767; };
-            grain.position.set(position(g, 0), position(g, 1), position(g, 2));
-            grain.quaternion.set(turn(1), turn(2), turn(3), turn(0)).normalize();
-            grain.visible = isFinite(grain.position.x);
-        });
+        var grains = scene.grain_mesh.length, place = new THREE.Vector3(), size = new THREE.Vector3(), turned = new THREE.Quaternion();
+        function turn(g, c) { return made.turns[(frame * 4 + c) * grains + g] / 32767; }
         made.groups.forEach(function (group) {
             group.members.forEach(function (s, k) {
-                var b = made.grains.length + s, x = position(b, 0), r = isFinite(x) ? scene.sphere_radius[s] : 0;
-                matrix.makeScale(r, r, r);
-                if (r > 0) matrix.setPosition(x, position(b, 1), position(b, 2));
+                var b = group.turned ? s : grains + s, x = position(b, 0);
+                var scale = !isFinite(x) ? 0 : group.turned ? scene.grain_scale[s] : scene.sphere_radius[s];
+                if (group.turned) turned.set(turn(s, 1), turn(s, 2), turn(s, 3), turn(s, 0)).normalize();
+                if (scale > 0) place.set(x, position(b, 1), position(b, 2));
+                matrix.compose(place, turned, size.set(scale, scale, scale));
                 group.mesh.setMatrixAt(k, matrix);
             });
             group.mesh.instanceMatrix.needsUpdate = true;
