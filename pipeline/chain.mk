@@ -1,12 +1,7 @@
 # From a CT stack to the report, one rule a step. Called by the Makefile beside it, after the build. A step runs again when one of its
 # inputs, its options or its program has changed.
-SHELL := /bin/bash
-.SHELLFLAGS := -euo pipefail -c
-.DELETE_ON_ERROR:
+include $(dir $(lastword $(MAKEFILE_LIST)))common.mk
 .DEFAULT_GOAL := report
-here := $(patsubst %/,%,$(dir $(abspath $(lastword $(MAKEFILE_LIST)))))
-root := $(patsubst %/,%,$(dir $(here)))
-bin ?= $(root)/build/release/bin
 
 #:
 #: Variables of `curves` (unset: the default of the tool; quantities take units, such as 30um):
@@ -24,21 +19,13 @@ bin ?= $(root)/build/release/bin
 #: More options of a tool: CSCT2LS_OPTIONS, LS2SH_OPTIONS, PACK_OPTIONS, CASE_OPTIONS.
 OUT ?= $(root)/build/curves
 SPEC ?= $(here)/specs/demo.toml
-# Paths are relative to the folder that make was called from.
-from_caller = $(if $(filter /%,$(1)),$(1),$(abspath $(or $(CALLER),.)/$(1)))
-stack := $(call from_caller,$(CT))
-stack_file := $(firstword $(subst .h5:,.h5 ,$(stack)))
 spec := $(call from_caller,$(SPEC))
 out := $(call from_caller,$(OUT))
 ifeq ($(CT),)
     $(error name your stack: make -C pipeline CT=stack.tif VOXEL=30um curves)
 endif
 
-option = $(if $($(2)),$(1) '$($(2))')
-threads := $(call option,--threads,THREADS)
-csct2ls := $(bin)/csct2ls '$(stack)' $(call option,--voxel-size,VOXEL) $(call option,--solid,SOLID) $(call option,--split,SPLIT) \
-    $(call option,--threshold,THRESHOLD) $(call option,--labels,LABELS) $(call option,--scale-to,SCALE_TO) $(call option,--spacing,SPACING) \
-    $(CSCT2LS_OPTIONS) $(threads)
+csct2ls := $(bin)/csct2ls '$(stack)' $(stack_options) $(threads)
 ls2sh := $(bin)/ls2sh $(out)/grains.vdb $(call option,--degree,DEGREE) $(LS2SH_OPTIONS) $(threads)
 pack := $(bin)/pack-sample $(spec) --grains $(out)/grains.vdb $(call option,--seed,SEED) $(PACK_OPTIONS) $(threads)
 case := $(bin)/make-case $(out)/sample.h5 $(call option,--velocity,VELOCITY) $(call option,--angle,ANGLE) $(call option,--hole,HOLE) \
@@ -47,12 +34,9 @@ suffuse := $(bin)/suffuse $(out)/case $(threads)
 report := $(bin)/erosion-report $(out)/case
 
 # .<step>.options holds the command of a step and changes only when that does.
-.PHONY: report always
+.PHONY: report
 $(out)/.%.options: always
-	@mkdir -p $(@D)
-	@cmp -s - $@ <<<"$($*)" || echo "$($*)" >$@
-
-say = @echo "== $(1)"
+	$(call remember,$($*))
 
 $(out)/grains.vdb: $(stack_file) $(bin)/csct2ls $(out)/.csct2ls.options
 	$(call say,csct2ls: grains and their voids from the stack)
@@ -64,8 +48,7 @@ $(out)/grains.sh.h5: $(out)/grains.vdb $(bin)/ls2sh $(out)/.ls2sh.options
 
 $(out)/sample.h5: $(out)/grains.vdb $(spec) $(bin)/pack-sample $(out)/.pack.options
 	$(call say,pack-sample: gap-graded sample)
-	@resume=; last=$@.checkpoint; [ $$last -nt $(out)/.pack.options ] && [ $$last -nt $(spec) ] && [ $$last -nt $< ] && [ $$last -nt $(bin)/pack-sample ] && resume=--resume; \
-	    $(pack) $$resume -o $@
+	@$(call resumable,$@.checkpoint,$^); $(pack) $$resume -o $@
 	@[ ! -f $@.checkpoint ] || { echo "stopped before the end; the same make command goes on" >&2; exit 1; }
 
 $(out)/case/case.toml: $(out)/sample.h5 $(bin)/make-case $(out)/.case.options
@@ -75,8 +58,7 @@ $(out)/case/case.toml: $(out)/sample.h5 $(bin)/make-case $(out)/.case.options
 # A run that was interrupted goes on from its checkpoint, as a packing does, unless the case is newer.
 $(out)/suffuse.txt: $(out)/case/case.toml $(bin)/suffuse $(out)/.suffuse.options
 	$(call say,suffuse: flow and erosion)
-	@resume=; [ $(out)/case/checkpoint.h5 -nt $(out)/case/case.toml ] && [ $(out)/case/checkpoint.h5 -nt $(bin)/suffuse ] && resume=--resume; \
-	    $(suffuse) $$resume | tee $@
+	@$(call resumable,$(out)/case/checkpoint.h5,$(out)/case/case.toml $(bin)/suffuse); $(suffuse) $$resume | tee $@
 	@! grep -q 'go on with --resume' $@ || { echo "stopped before the end; the same make command goes on" >&2; exit 1; }
 
 $(out)/report/report.html: $(out)/suffuse.txt $(bin)/erosion-report $(out)/.report.options
