@@ -243,6 +243,67 @@ TEST(FineCoupling, feels_a_uniform_flow_exactly_whatever_the_blocks)
     }
 }
 
+TEST(FineCoupling, feels_a_uniform_flow_exactly_beside_walls_and_grains)
+{
+    GridSpec grid = box({16, 16, 20}, 1e-3, BoundaryKind::slip);
+    grid.boundary[z_minus].kind = grid.boundary[z_plus].kind = BoundaryKind::periodic;
+    std::vector<RigidMotion> motions(1);
+    motions[0].position = Vector3d(8e-3, 8e-3, 8e-3);
+    ImmersedBodies bodies(grid);
+    bodies.add(sphere_shape(8e-3), motions[0]);
+    bodies.place(motions);
+    Flow flow(grid, {});
+    flow.set_velocity([](const Vector3d&, int axis) { return axis == 2 ? 0.3 : 0.0; });
+    Fines fines;
+    fines.add({0.3e-3, 0.2e-3, 9e-3}, 2e-3);  // in an edge of the box
+    fines.add({8e-3, 3.1e-3, 8e-3}, 2e-3);    // touches the grain
+    fines.add({1.2e-3, 8e-3, 8e-3}, 2.4e-3);  // between grain and wall
+    for (const int cells : {1, 2}) {
+        KernelOptions options;
+        options.coupling_cells = cells;
+        FineCoupling coupling(grid, options);
+        coupling.place(fines.positions, fines.diameters, &bodies.cell_solid_fraction());
+        coupling.deposit_volume(flow, fines.volumes, fines.velocities);
+        std::vector<FeltFlow> felt(fines.size());
+        coupling.feel(flow, felt);
+        for (const FeltFlow& f : felt) EXPECT_LT((f.velocity - Vector3d(0.0, 0.0, 0.3)).norm(), 1e-12) << cells;
+    }
+}
+
+TEST(FineCoupling, a_fine_in_the_void_of_a_grain_feels_the_flow_of_the_void)
+{
+    // hollow grain, void 5 mm, wall 2.5 mm thick: still water inside, a stream outside, and the other way round
+    const double inner = 2.5e-3, outer = 5e-3;
+    const GridSpec grid = box({28, 28, 28}, 0.5e-3, BoundaryKind::periodic);
+    const Vector3d centre = Vector3d::Constant(7.1e-3);
+    std::vector<RigidMotion> motions(1);
+    motions[0].position = centre;
+    BodyShape shell = sphere_shape(2 * outer);
+    shell.distance = [=](std::span<const Vector3d> points, std::span<double> distances) {
+        for (std::size_t i = 0; i < points.size(); ++i)
+            distances[i] = std::max(points[i].norm() - outer, inner - points[i].norm());
+    };
+    ImmersedBodies bodies(grid);
+    bodies.add(shell, motions[0]);
+    bodies.place(motions);
+    Fines fines;
+    fines.add(centre, 0.8e-3);
+    fines.add(centre + Vector3d(1.9e-3, 0.0, 0.0), 0.8e-3);  // lies against the wall of the void
+    for (const bool stream_inside : {false, true}) {
+        Flow flow(grid, {});
+        flow.set_velocity([&](const Vector3d& x, int axis) {
+            const bool inside = (x - centre).norm() < 0.5 * (inner + outer);
+            return axis == 2 && inside == stream_inside ? 0.2 : 0.0;
+        });
+        FineCoupling coupling(grid);
+        coupling.place(fines.positions, fines.diameters, &bodies.cell_solid_fraction());
+        coupling.deposit_volume(flow, fines.volumes, fines.velocities);
+        std::vector<FeltFlow> felt(fines.size());
+        coupling.feel(flow, felt);
+        for (const FeltFlow& f : felt) EXPECT_NEAR(f.velocity.z(), stream_inside ? 0.2 : 0.0, 1e-12);
+    }
+}
+
 TEST(FineCoupling, exchanges_momentum_with_the_flow_to_round_off)
 {
     for (const BoundaryKind kind : {BoundaryKind::slip, BoundaryKind::periodic, BoundaryKind::wall})
