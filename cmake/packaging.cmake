@@ -1,0 +1,33 @@
+# Installation beyond the programs, and the .deb: cpack --config build/release/CPackConfig.cmake
+get_property(coral_tools GLOBAL PROPERTY CORAL_TOOLS)
+list(JOIN coral_tools " " coral_tool_list)
+# Man pages and completion are what the built tools say of themselves, so they are made when they are installed.
+install(CODE "
+    foreach(step IN ITEMS \"manpages.sh;${CMAKE_RUNTIME_OUTPUT_DIRECTORY};${PROJECT_BINARY_DIR}/packaging/man\" \"completion.sh;${CMAKE_RUNTIME_OUTPUT_DIRECTORY};${PROJECT_BINARY_DIR}/packaging/coralsand\")
+        list(POP_FRONT step script)
+        execute_process(COMMAND ${PROJECT_SOURCE_DIR}/pipeline/packaging/\${script} \${step} ${coral_tool_list} COMMAND_ERROR_IS_FATAL ANY)
+    endforeach()")
+install(DIRECTORY ${PROJECT_BINARY_DIR}/packaging/man/ DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 FILES_MATCHING PATTERN "*.1")
+install(FILES ${PROJECT_BINARY_DIR}/packaging/coralsand DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions)
+install(DIRECTORY docs/ DESTINATION ${CMAKE_INSTALL_DOCDIR})
+install(FILES README.md LICENSE CITATION.cff CHANGELOG.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
+install(DIRECTORY pipeline/specs data/samples DESTINATION ${CMAKE_INSTALL_DATADIR}/coralsand)
+
+set(CPACK_GENERATOR DEB)
+set(CPACK_PACKAGE_NAME coralsand)
+set(CPACK_PACKAGE_CONTACT "Coralsand developers <coralsand@localhost>")
+set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "${PROJECT_DESCRIPTION}")
+set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
+set(CPACK_STRIP_FILES TRUE)
+set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
+set(CPACK_DEBIAN_PACKAGE_SECTION science)
+# Libraries are found by dpkg-shlibdeps; without dpkg-dev the package would silently name none.
+find_program(CORAL_SHLIBDEPS dpkg-shlibdeps)
+if(CORAL_SHLIBDEPS)
+    set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
+else()
+    message(STATUS "dpkg-shlibdeps is absent (Debian: dpkg-dev): a .deb made here would name no libraries")
+endif()
+set(CPACK_DEBIAN_PACKAGE_DEPENDS "gnuplot-nox")
+set(CPACK_DEBIAN_PACKAGE_RECOMMENDS "libjs-dygraphs, libjs-three")
+include(CPack)
