@@ -67,7 +67,7 @@ TEST(Cylinder, thousand_elastic_bounces_keep_energy_and_angular_momentum)
         EXPECT_GT(world.counters().contacts, 1000);
         const Energy e = world.energy();
         RecordProperty("relative_drift", std::to_string(e.stored() / before - 1.0));
-        EXPECT_NEAR(e.stored() / before, 1.0, 1e-3) << sideways;
+        EXPECT_NEAR(e.stored() / before, 1.0, 1e-6) << sideways;
         EXPECT_NEAR(e.closure / before, 0.0, 1e-6) << sideways;
         const Vec3 arm = world.position(b) - in_cylinder(0, 0, 0), moment = arm.cross(world.velocity(b));
         EXPECT_NEAR(moment.z() / (path * speed), turn / (path * speed), 1e-6) << "the wall pushes towards the axis";
