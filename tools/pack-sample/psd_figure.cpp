@@ -67,7 +67,10 @@ void draw_psd(const pack::Sample& sample, const fs::path& file)
     figure.x_factor = 1e3;
     figure.x_logarithmic = true;
     figure.table.columns = {"case", "diameter", "passing"};
-    figure.panels = {{"", "passing [% of mass]", 100, false, {{"passing", ""}}}};
+    report::Panel& panel = figure.panels.emplace_back();
+    panel.y_label = "passing [% of mass]";
+    panel.factor = 100;
+    panel.curves.emplace_back().column = "passing";
     const auto add = [&](const char* name, const pack::Psd& psd) {
         if (psd.empty()) return;
         figure.cases.push_back(name);
