@@ -56,6 +56,8 @@ nlohmann::ordered_json to_json(const pack::Sample& sample, const pack::PackRepor
     json["coarse"] = sample.particles.size() - fines;
     json["fine"] = fines;
     json["size"] = {sample.size.x(), sample.size.y(), sample.size.z()};
+    if (const pack::Wall* side = pack::cylinder(sample)) json["diameter"] = 2 * side->radius;
+    if (!sample.period.isZero(0)) json["period"] = {sample.period.x(), sample.period.y(), sample.period.z()};
     json["porosity"] = s.porosity;
     json["interparticle_porosity"] = s.interparticle_porosity;
     json["void_ratio"] = s.void_ratio;
@@ -91,9 +93,8 @@ std::string to_text(const pack::Sample& sample, const pack::PackReport& report, 
     const pack::Statistics& s = sample.statistics;
     std::size_t fines = 0;
     for (const auto& p : sample.particles) fines += p.role == pack::Role::fine;
-    std::string text = fmt::format("{}: {} coarse and {} fine grains in {} x {} x {}\n", output.filename().string(), sample.particles.size() - fines,
-                                   fines, format_quantity(sample.size.x(), Dimension::length), format_quantity(sample.size.y(), Dimension::length),
-                                   format_quantity(sample.size.z(), Dimension::length));
+    std::string text = fmt::format("{}: {} coarse and {} fine grains in {}\n", output.filename().string(), sample.particles.size() - fines,
+                                   fines, pack::describe_enclosure(sample));
     const auto line = [&](const char* name, const std::string& value) { text += fmt::format("  {:32} {}\n", name, value); };
     line("porosity", fmt::format("{:.4f} with intraparticle voids, {:.4f} without", s.porosity, s.interparticle_porosity));
     line("void ratio", fmt::format("{:.4f} with intraparticle voids, {:.4f} without", s.void_ratio, s.interparticle_void_ratio));

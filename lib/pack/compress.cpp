@@ -46,9 +46,10 @@ void step_some(dem::World& world, double dt, double drag)
 void check_sound(const dem::World& world, const Box& box)
 {
     if (world.statistics().max_overlap > deepest_overlap) throw_deepest(world);
-    const Eigen::Vector3d lower = box.lower(world), upper = box.upper(world);
-    for (int i = 0; i < world.body_count(); ++i) check_inside(world, i, i, lower, upper, "compression", "lower max_velocity or the pressure");
+    for (int i = 0; i < world.body_count(); ++i) box.check_inside(world, i, i, "compression", "lower max_velocity or the pressure");
 }
+
+bool moves(const Box& box, const Compression& rule, int axis) { return box.has_planes(axis) && (axis == 2 || rule.walls == MovingWalls::all); }
 
 double axis_pressure(const dem::World& world, const Box& box, int axis)
 {
@@ -91,20 +92,22 @@ double serve(dem::World& world, const Box& box, const Spec& spec, const std::arr
 {
     const Compression& rule = spec.compression;
     const Eigen::Vector3d size = box.upper(world) - box.lower(world);
-    const int first_axis = rule.lateral ? 0 : 2;
-    double worst = 0;
+    const bool both = rule.walls != MovingWalls::top;
+    double worst = 0, pairs = 0;
     mean = 0;
     lid_touches = lid_touches || box.pressure(world, 5) > lid_first * rule.pressure;
-    for (int axis = first_axis; axis < 3; ++axis) {
+    for (int axis = 0; axis < 3; ++axis) {
+        if (!moves(box, rule, axis)) continue;
         // the top alone pushes against a bottom that also carries the weight
-        const double p = rule.lateral ? axis_pressure(world, box, axis) : box.pressure(world, 5);
+        const double p = both ? axis_pressure(world, box, axis) : box.pressure(world, 5);
         const double missing = rule.pressure - p;
         worst = std::max(worst, std::abs(missing) / rule.pressure);
-        mean += p / (3 - first_axis);
+        mean += p, pairs += 1;
         const int touching = std::min(contacts[std::size_t(2 * axis)], contacts[std::size_t(2 * axis + 1)]);
-        const double speed = servo_speed(missing, size.prod() / size[axis], size[axis], touching, stiffness, mass, rule.max_velocity);
-        set_pair_speed(world, box, axis, axis < 2 && !lid_touches ? 0.0 : speed, rule.lateral);
+        const double speed = servo_speed(missing, box.area(world, axis), size[axis], touching, stiffness, mass, rule.max_velocity);
+        set_pair_speed(world, box, axis, axis < 2 && !lid_touches ? 0.0 : speed, both);
     }
+    mean /= pairs;
     return worst;
 }
 
@@ -122,7 +125,7 @@ bool to_pressure(dem::World& world, const Box& box, const Spec& spec, Keeper& ke
         clock.lap();
         keeper.visit(world);
         double worst = 0, mean = 0;
-        const auto contacts = wall_contacts(world, box);
+        const auto contacts = box.contacts(world);
         window.start(world);
         for (int check = 0; check < checks_per_window; ++check) {
             double now = 0;
@@ -153,7 +156,7 @@ bool to_void_ratio(dem::World& world, const Box& box, const Spec& spec, double a
 {
     const Compression& rule = spec.compression;
     const double dt = step_of(world, spec), start = keeper.state.start, target = apparent_volume * (1 + rule.void_ratio);
-    const double first = (box.upper(world) - box.lower(world)).prod();
+    const double first = box.volume(world);
     if (first < target)
         throw Error("compression", "the poured sample has void ratio " + to_text(first / apparent_volume - 1) + ", below the target of " + to_text(rule.void_ratio),
                     "raise [dropping] friction or void_ratio");
@@ -161,7 +164,7 @@ bool to_void_ratio(dem::World& world, const Box& box, const Spec& spec, double a
     Progress progress("compressing", 1);
     while (world.time() - start < rule.time_limit) {
         const Eigen::Vector3d size = box.upper(world) - box.lower(world);
-        const double volume = size.prod(), excess = volume / target - 1;
+        const double volume = box.volume(world), excess = volume / target - 1;
         if (excess < 1e-4) {
             progress.finish();
             return true;
@@ -169,9 +172,12 @@ bool to_void_ratio(dem::World& world, const Box& box, const Spec& spec, double a
         clock.lap();
         keeper.visit(world);
         // relative closing rate of every moving edge; the last part takes a few hundred steps
-        const double edges = rule.lateral ? 3 : 1;
-        const double rate = std::min(2 * rule.max_velocity / (rule.lateral ? size.maxCoeff() : size.z()), excess / (edges * 500 * dt));
-        for (int axis = rule.lateral ? 0 : 2; axis < 3; ++axis) set_pair_speed(world, box, axis, 0.5 * rate * size[axis], rule.lateral);
+        double edges = 0, longest = 0;
+        for (int axis = 0; axis < 3; ++axis)
+            if (moves(box, rule, axis)) edges += 1, longest = std::max(longest, size[axis]);
+        const double rate = std::min(2 * rule.max_velocity / longest, excess / (edges * 500 * dt));
+        for (int axis = 0; axis < 3; ++axis)
+            if (moves(box, rule, axis)) set_pair_speed(world, box, axis, 0.5 * rate * size[axis], rule.walls != MovingWalls::top);
         step_some(world, dt, rule.drag);
         check_sound(world, box);
         progress.update(first > target ? std::min((first - volume) / (first - target), 0.99) : 0.99, "void ratio " + to_text(std::round(1e4 * (volume / apparent_volume - 1)) / 1e4));
@@ -180,22 +186,6 @@ bool to_void_ratio(dem::World& world, const Box& box, const Spec& spec, double a
 }
 
 }  // namespace
-
-Eigen::Vector3d Box::lower(const dem::World& world) const
-{
-    return {world.wall_point(first).x(), world.wall_point(first + 2).y(), world.wall_point(first + 4).z()};
-}
-
-Eigen::Vector3d Box::upper(const dem::World& world) const
-{
-    return {world.wall_point(first + 1).x(), world.wall_point(first + 3).y(), world.wall_point(first + 5).z()};
-}
-
-double Box::pressure(const dem::World& world, int i) const
-{
-    const Eigen::Vector3d size = upper(world) - lower(world);
-    return -world.wall_force(first + i).dot(world.wall_normal(first + i)) * size[i / 2] / size.prod();
-}
 
 // The stiffness of the sample between the walls is that of its wall contacts in parallel, K_w, in series over n = gap/s layers with
 // s = sqrt(A/contacts) the spacing of those contacts: K = K_w/n. The time constant is 2 sqrt(M/K): slower than the sample's own motion.
@@ -209,35 +199,15 @@ double servo_speed(double missing, double area, double gap, int wall_contacts, d
 
 void set_pair_speed(dem::World& world, const Box& box, int axis, double speed, bool both)
 {
-    const int low = box.first + 2 * axis, high = low + 1;
+    const int low = box.plane[2 * std::size_t(axis)], high = box.plane[2 * std::size_t(axis) + 1];
     world.set_wall_velocity(low, both ? Eigen::Vector3d(speed * world.wall_normal(low)) : Eigen::Vector3d(Eigen::Vector3d::Zero()));
     world.set_wall_velocity(high, speed * (both ? 1.0 : 2.0) * world.wall_normal(high));
 }
 
 void stop_walls(dem::World& world, const Box& box)
 {
-    for (int i = 0; i < 6; ++i) world.set_wall_velocity(box.first + i, Eigen::Vector3d::Zero());
-}
-
-std::array<int, 6> wall_contacts(const dem::World& world, const Box& box)
-{
-    std::array<int, 6> count{};
-    for (const dem::Contact& c : world.contacts())
-        if (const int wall = -1 - c.second - box.first; c.second < 0 && wall >= 0 && wall < 6) ++count[std::size_t(wall)];
-    return count;
-}
-
-void check_inside(const dem::World& world, int body, int grain, const Eigen::Vector3d& lower, const Eigen::Vector3d& upper, const char* phase, const char* help)
-{
-    const Eigen::Vector3d& x = world.position(body);
-    for (int axis = 0; axis < 3; ++axis) {
-        const bool below = !(x[axis] >= lower[axis]);
-        if (!below && x[axis] <= upper[axis]) continue;
-        const auto mm = [](double value) { return format_quantity(value, Dimension::length); };
-        throw Error(phase, "grain " + std::to_string(grain) + " (" + world.role(body) + ", " + mm(2 * world.equivalent_radius(body)) + ") left the box through the wall " + "xyz"[axis] + (below ? "-" : "+") +
-                               " at " + to_text(std::round(1e6 * world.time()) / 1e6) + " s: its centre is at (" + mm(x.x()) + ", " + mm(x.y()) + ", " + mm(x.z()) + ")",
-                    help);
-    }
+    for (const int wall : box.plane)
+        if (wall >= 0) world.set_wall_velocity(wall, Eigen::Vector3d::Zero());
 }
 
 std::string describe(const MotionWindow::Means& means)

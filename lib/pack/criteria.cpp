@@ -119,7 +119,7 @@ double fines_stress_ratio(const Sample& sample)
     for (const Particle& p : sample.particles) space[std::size_t(p.role)] += apparent_volume(sample, p);
     const auto press = [&](std::int32_t body, const Eigen::Vector3d& force, const Eigen::Vector3d& point) {
         const Particle& p = sample.particles[std::size_t(body)];
-        stress[std::size_t(p.role)] -= force.dot(point - p.position) / 3;
+        stress[std::size_t(p.role)] -= force.dot(nearest_image(sample, point - p.position)) / 3;
     };
     for (const Contact& c : sample.contacts) {
         const Eigen::Vector3d force = c.normal_force + c.tangential_force;

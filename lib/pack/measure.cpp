@@ -14,7 +14,7 @@ constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
 /// Volumes, fines and gap ratio.
 void measure_volumes(const Sample& sample, Statistics& s)
 {
-    const double box = sample.size.prod();
+    const double box = enclosed_volume(sample);
     double solid = 0, apparent = 0, total = 0, fines = 0, smallest_coarse = 1e300, largest_fine = 0;
     for (const Particle& p : sample.particles) {
         solid += volume(sample, p);
@@ -71,25 +71,48 @@ void measure_contacts(const Sample& sample, Statistics& s)
     s.rattler_fraction = n > 0 ? double(std::count_if(touching.begin(), touching.end(), [](int t) { return t < 2; })) / double(n) : 0;
 }
 
+/// Takes a position to the image between 0 and the period; returns the way.
+Eigen::Vector3d into_the_box(const Sample& sample, Eigen::Vector3d& position)
+{
+    const Eigen::Vector3d before = position;
+    for (int axis = 0; axis < 3; ++axis) {
+        const double length = sample.period[axis];
+        if (length <= 0) continue;
+        position[axis] -= length * std::floor(position[axis] / length);
+        if (position[axis] >= length) position[axis] = 0;  // rounded up from just below zero
+    }
+    return position - before;
+}
+
 }  // namespace
 
 void measure(const dem::World& world, const Box& box, const MotionWindow::Means& rest, double dem_step, std::int64_t steps, Sample& sample)
 {
     const Eigen::Vector3d lower = box.lower(world);
     sample.size = box.upper(world) - lower;
+    std::vector<Eigen::Vector3d> shift;
     for (std::size_t i = 0; i < sample.particles.size(); ++i) {
         Particle& p = sample.particles[i];
         p.position = world.position(int(i)) - lower;
+        shift.push_back(into_the_box(sample, p.position));
         p.orientation = world.orientation(int(i));
         p.velocity = world.velocity(int(i));
         p.angular_velocity = world.angular_velocity(int(i));
     }
-    for (std::size_t w = 0; w < sample.walls.size(); ++w) {
-        sample.walls[w].point = world.wall_point(box.first + int(w)) - lower;
-        sample.walls[w].pressure = box.pressure(world, int(w));
+    double sides = 0;
+    for (std::size_t i = 0, w = 0; w < sample.walls.size(); ++w) {
+        Wall& wall = sample.walls[w];
+        if (wall.radius > 0) {
+            wall.pressure = box.side_pressure(world);
+        } else {
+            while (box.plane[i] < 0) ++i;  // both are in the order x-, x+, ..., z+
+            wall.point = world.wall_point(box.plane[i]) - lower;
+            wall.pressure = box.pressure(world, int(i++));
+        }
+        sides += wall.radius > 0 ? 4 : 1;
     }
     sample.contacts = world.contacts();
-    for (Contact& c : sample.contacts) c.point -= lower;
+    for (Contact& c : sample.contacts) c.point += shift[std::size_t(c.first)] - lower;
     sample.springs = world.contact_springs();
 
     Statistics& s = sample.statistics;
@@ -99,7 +122,7 @@ void measure(const dem::World& world, const Box& box, const MotionWindow::Means&
     s.kinetic_energy = world.statistics().kinetic_energy;
     s.kinetic_ratio = rest.kinetic_ratio;
     s.unbalanced_ratio = rest.unbalanced_ratio;
-    for (const Wall& w : sample.walls) s.mean_pressure += w.pressure / double(sample.walls.size());
+    for (const Wall& w : sample.walls) s.mean_pressure += (w.radius > 0 ? 4 : 1) * w.pressure / sides;
     s.dem_step = dem_step;
     s.dem_steps = double(steps);
 

@@ -11,14 +11,6 @@
 namespace coral::pack {
 namespace {
 
-/// Smooth walls around the poured grains; the lid touches the highest bounding sphere.
-std::vector<Wall> box_walls(const Eigen::Vector3d& size)
-{
-    const Eigen::Vector3d zero = Eigen::Vector3d::Zero();
-    return {{"x-", zero, Eigen::Vector3d::UnitX()},  {"x+", size, -Eigen::Vector3d::UnitX()}, {"y-", zero, Eigen::Vector3d::UnitY()},
-            {"y+", size, -Eigen::Vector3d::UnitY()}, {"z-", zero, Eigen::Vector3d::UnitZ()},  {"z+", size, -Eigen::Vector3d::UnitZ()}};
-}
-
 void collect_warnings(const Spec& spec, PackReport& report)
 {
     report.warnings = spec.warnings;
@@ -39,7 +31,7 @@ void collect_warnings(const Spec& spec, PackReport& report)
 void check_step(const Spec& spec, const Sample& sample)
 {
     if (spec.dem_step <= 0 || spec.force_step) return;
-    dem::World world;
+    dem::World world(world_options(sample));
     add_sample(world, sample);
     constexpr double highest = 1.5;  // of the critical steps; World::step refuses more
     const double critical = world.critical_time_step();
@@ -58,18 +50,20 @@ Sample pack(const Spec& spec, std::uint64_t seed, detail::Keeper& keeper)
         const detail::LapClock clock(report.loading_seconds);
         return make_grains(spec, seed, [&] { keeper.visit(); });
     }();
+    grains.sample.size = spec.size;
+    grains.sample.period = spec.period;
+    grains.sample.gravity = spec.gravity;
     check_step(spec, grains.sample);
     if (!keeper.skips(Phase::pouring)) detail::pour(grains, spec, seed, keeper);
 
     Sample& sample = grains.sample;
-    sample.walls = box_walls(sample.size);
-    dem::WorldOptions options;
-    options.gravity = spec.gravity;
+    sample.walls = detail::walls_around(spec, sample.size.z());  // the lid touches the highest bounding sphere
+    dem::WorldOptions options = world_options(sample);
     if (spec.all_walls) options.sphere_scheme = dem::SphereScheme::walls;
     options.force_step = spec.force_step;
     dem::World world(options);
     const SampleIds ids = add_sample(world, sample);
-    const detail::Box box{ids.walls.front()};
+    const detail::Box box(sample, ids.walls);
     if (keeper.skips(Phase::pouring)) {
         keeper.restore(world);
     } else {

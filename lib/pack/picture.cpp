@@ -87,6 +87,22 @@ public:
     }
 
 private:
+    /// Places in which a ball shows in the box: across a periodic side it reaches in again from the other.
+    static std::vector<Vec3> images(const Sample& sample, const Vec3& centre, double bound)
+    {
+        std::vector<Vec3> places{centre};
+        for (int axis = 0; axis < 3; ++axis) {
+            const double length = sample.period[axis];
+            if (length <= 0) continue;
+            for (std::size_t k = places.size(); k-- > 0;) {
+                Vec3 image = places[k];
+                image[axis] += image[axis] < 0.5 * length ? length : -length;
+                if (image[axis] > -bound && image[axis] < length + bound) places.push_back(image);
+            }
+        }
+        return places;
+    }
+
     void add_bodies(const Sample& sample)
     {
         double smallest = never, largest = 0;
@@ -99,17 +115,19 @@ private:
             const Particle& p = sample.particles[i];
             Body b;
             b.shape = shapes_[std::size_t(p.shape)].get();
-            b.centre = p.position;
             b.turned_back = p.orientation.conjugate();
             b.scale = p.scale;
             b.bound = p.scale * b.shape->bounding_radius();
             b.coarse = p.role == Role::coarse;
-            if (b.coarse ? b.centre.y() + b.bound < cut_ : b.centre.y() < cut_) continue;
             const double tone = 0.03 * double(i % 5);  // neighbours differ a little
             b.colour = b.coarse ? Vec3(0.80 - tone, 0.66 - tone, 0.46 - tone)
                                 : scale_colour(largest > smallest ? (equivalent_diameter(sample, p) - smallest) / (largest - smallest) : 0.5);
-            b.u = right_.dot(b.centre), b.v = up_.dot(b.centre), b.depth = towards.dot(b.centre);
-            bodies_.push_back(b);
+            for (const Vec3& centre : images(sample, p.position, b.bound)) {
+                b.centre = centre;
+                if (b.coarse ? b.centre.y() + b.bound < cut_ : b.centre.y() < cut_) continue;
+                b.u = right_.dot(b.centre), b.v = up_.dot(b.centre), b.depth = towards.dot(b.centre);
+                bodies_.push_back(b);
+            }
         }
         std::stable_sort(bodies_.begin(), bodies_.end(), [](const Body& a, const Body& b) { return a.depth - a.bound < b.depth - b.bound; });
     }
@@ -125,7 +143,7 @@ private:
             take(right_.dot(corner), up_.dot(corner), 0);
         }
         for (const Body& b : bodies_)
-            if (!b.coarse) take(b.u, b.v, b.bound);
+            if (!b.coarse || !sample.period.isZero(0)) take(b.u, b.v, b.bound);  // coarse grains stay within walls
         const Eigen::Vector2d size = (1 + 2 * margin) * (high - low);
         pixel_ = size.maxCoeff() / pixels;
         width_ = std::max(1, int(std::ceil(size.x() / pixel_))), height_ = std::max(1, int(std::ceil(size.y() / pixel_)));

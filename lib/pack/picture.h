@@ -16,7 +16,7 @@ struct Picture {
 
 /// Parallel projection from the front, right and above, on white. What lies in front of the middle plane y = size.y/2 is taken away: cut faces of coarse
 /// grains are light, fines are left out when their centre is in front. Coarse grains have the colours of sand, fines go from
-/// violet (the smallest) over green to yellow (the largest). The same bytes for any number of threads.
+/// violet (the smallest) over green to yellow (the largest). A grain across a periodic side shows at both ends. The same bytes for any number of threads.
 /// \param pixels  of the longer side, at least 16
 Picture draw_sample(const Sample& sample, int pixels);
 

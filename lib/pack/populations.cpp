@@ -181,15 +181,15 @@ void check_room(const Spec& spec, const Grains& grains)
 {
     double apparent = 0;
     for (const Particle& p : grains.sample.particles) apparent += apparent_volume(grains.sample, p);
-    const double box = spec.size.prod();
+    const double box = base_area(spec) * spec.size.z();
     if (apparent > 0.74 * box)
-        throw UsageError(spec.box_location, "key 'box.size': the grains fill " + std::to_string(int(100 * apparent / box)) + " % of the box, no packing holds more than 74 %",
+        throw UsageError(spec.box_location, "key '" + spec.box_key + "': the grains fill " + std::to_string(int(100 * apparent / box)) + " % of the " + (spec.cylinder ? "cylinder" : "box") + ", no packing holds more than 74 %",
                          "enlarge the box or take fewer grains");
     for (std::size_t i = 0; i < grains.sample.particles.size(); ++i) {
         const Particle& p = grains.sample.particles[i];
         const double d = equivalent_diameter(grains.sample, p), base = spec.size.head<2>().minCoeff();
         const Population& of = spec.populations[std::size_t(grains.population[i])];
-        if (d >= base) throw UsageError(of.location, "a grain of population '" + of.name + "', " + format_quantity(d, Dimension::length) + ", does not fit the base of the box, " + format_quantity(base, Dimension::length), "enlarge [box] size");
+        if (d >= base) throw UsageError(of.location, "a grain of population '" + of.name + "', " + format_quantity(d, Dimension::length) + ", does not fit the base of the box, " + format_quantity(base, Dimension::length), "enlarge [box] size or [cylinder] diameter");
     }
 }
 

@@ -29,16 +29,16 @@ double bounding_radius(const std::vector<std::shared_ptr<const dem::Shape>>& sha
 }
 
 /// Number of layers that keeps each coarse batch to about one layer of grains; without coarse grains, a few diameters of fines.
-int layer_count(const Sample& sample, const std::vector<int>& coarse, const std::vector<double>& radius, double base_area)
+int layer_count(const Sample& sample, const std::vector<int>& coarse, const std::vector<double>& radius, double base)
 {
     double area = 0;
     const auto cover = [&](int i) { return 4 * radius[std::size_t(i)] * radius[std::size_t(i)]; };
     if (!coarse.empty()) {
         for (const int i : coarse) area += cover(i);
-        return std::clamp(int(std::ceil(area / (0.8 * base_area))), 1, int(coarse.size()));
+        return std::clamp(int(std::ceil(area / (0.8 * base))), 1, int(coarse.size()));
     }
     for (std::size_t i = 0; i < sample.particles.size(); ++i) area += cover(int(i));
-    return std::max(1, int(std::ceil(area / (4 * base_area))));
+    return std::max(1, int(std::ceil(area / (4 * base))));
 }
 
 /// Coarse and fine batches in turn; each role is shuffled so that every batch has its share of all populations.
@@ -49,7 +49,7 @@ std::vector<Batch> make_batches(const Sample& sample, const std::vector<double>&
         (sample.particles[i].role == Role::coarse ? coarse : fine).push_back(int(i));
     shuffle(coarse, random);
     shuffle(fine, random);
-    const int layers = spec.dropping.layers > 0 ? spec.dropping.layers : layer_count(sample, coarse, radius, spec.size.x() * spec.size.y());
+    const int layers = spec.dropping.layers > 0 ? spec.dropping.layers : layer_count(sample, coarse, radius, base_area(spec));
     std::vector<Batch> batches;
     for (int layer = 0; layer < layers; ++layer)
         for (const auto* role : {&coarse, &fine}) {
@@ -59,25 +59,48 @@ std::vector<Batch> make_batches(const Sample& sample, const std::vector<double>&
     return batches;
 }
 
+/// Evenly distributed where a ball of radius r fits between the side walls, from two even numbers.
+Eigen::Vector2d somewhere(const Spec& spec, double r, double x, double y)
+{
+    if (spec.cylinder) {
+        const double radius = 0.5 * spec.size.x(), across = (radius - r) * std::sqrt(x), angle = 2 * std::numbers::pi * y;
+        return {radius + across * std::cos(angle), radius + across * std::sin(angle)};
+    }
+    const Eigen::Vector2d share(x, y);
+    Eigen::Vector2d place;
+    for (int axis = 0; axis < 2; ++axis)
+        place[axis] = spec.period[axis] > 0 ? share[axis] * spec.size[axis] : r + share[axis] * std::max(spec.size[axis] - 2 * r, 0.0);
+    return place;
+}
+
+/// A grain must not touch another, or itself, on two sides at once.
+void check_periods(const Spec& spec, const std::vector<double>& radius)
+{
+    const double largest = *std::max_element(radius.begin(), radius.end());
+    for (int axis = 0; axis < 2; ++axis)
+        if (spec.period[axis] > 0 && spec.period[axis] < 4 * largest)
+            throw UsageError(spec.box_location, std::string("key 'box.size': grains of bounding diameter ") + to_text(2 * largest) + " m need a periodic side of twice that, and " +
+                                                    "xyz"[axis] + " has " + to_text(spec.period[axis]) + " m", "enlarge the box along it, or give it walls");
+}
+
 /// Places a batch at random above `floor` without overlap of bounding spheres, in a slab as thin as the grains allow.
 void place(const Batch& batch, Sample& sample, const std::vector<double>& radius, const Spec& spec, double floor, Random& random)
 {
     double volume = 0;
     for (const int i : batch) volume += 8 * std::pow(radius[std::size_t(i)], 3);
-    double thickness = volume / (0.4 * spec.size.x() * spec.size.y());
+    double thickness = volume / (0.4 * base_area(spec));
     for (std::size_t n = 0; n < batch.size(); ++n) {
         Particle& p = sample.particles[std::size_t(batch[n])];
         const double r = radius[std::size_t(batch[n])];
-        const Eigen::Array2d room = (spec.size.head<2>().array() - 2 * r).max(0.0);
         if (2 * r > spec.size.head<2>().minCoeff())
-            throw UsageError(spec.box_location, "key 'box.size': a grain of bounding diameter " + to_text(2 * r) + " m does not fit between the walls", "enlarge the base of the box");
+            throw UsageError(spec.box_location, "key '" + spec.box_key + "': a grain of bounding diameter " + to_text(2 * r) + " m does not fit between the walls", "enlarge the base of the box");
         p.orientation = random_rotation(random);
         for (int attempt = 1;; ++attempt) {
             const double x = uniform(random), y = uniform(random), z = uniform(random);
-            p.position = {r + x * room.x(), r + y * room.y(), floor + r + z * std::max(thickness - 2 * r, 0.0)};
+            p.position << somewhere(spec, r, x, y), floor + r + z * std::max(thickness - 2 * r, 0.0);
             const bool free = std::all_of(batch.begin(), batch.begin() + std::ptrdiff_t(n), [&](int other) {
                 const double reach = r + radius[std::size_t(other)];
-                return (sample.particles[std::size_t(other)].position - p.position).squaredNorm() > reach * reach;
+                return nearest_image(sample, sample.particles[std::size_t(other)].position - p.position).squaredNorm() > reach * reach;
             });
             if (free) break;
             if (attempt % 200 == 0) thickness *= 1.05;
@@ -85,11 +108,12 @@ void place(const Batch& batch, Sample& sample, const std::vector<double>& radius
     }
 }
 
-/// World of the pouring: softened contacts, smooth walls, no lid.
-dem::World soft_world(const Sample& sample, const Spec& spec, const std::vector<std::shared_ptr<const dem::Shape>>& shapes)
+/// World of the pouring: softened contacts, the smooth walls of the sample. `walls` gets their ids.
+dem::World soft_world(const Sample& sample, const Spec& spec, const std::vector<std::shared_ptr<const dem::Shape>>& shapes, std::vector<int>& walls)
 {
     dem::WorldOptions options;
     options.gravity = spec.gravity;
+    options.period = spec.period;
     if (spec.all_walls) options.sphere_scheme = dem::SphereScheme::walls;
     options.step_fraction = 0.5;
     dem::World world(options);
@@ -104,12 +128,8 @@ dem::World soft_world(const Sample& sample, const Spec& spec, const std::vector<
     Material smooth = world.material(0);
     smooth.name = "wall";
     smooth.friction = 0;
-    const int wall = world.add_material(smooth);
-    world.add_plane({0, 0, 0}, Eigen::Vector3d::UnitX(), wall);
-    world.add_plane({spec.size.x(), 0, 0}, -Eigen::Vector3d::UnitX(), wall);
-    world.add_plane({0, 0, 0}, Eigen::Vector3d::UnitY(), wall);
-    world.add_plane({0, spec.size.y(), 0}, -Eigen::Vector3d::UnitY(), wall);
-    world.add_plane({0, 0, 0}, Eigen::Vector3d::UnitZ(), wall);
+    const int material = world.add_material(smooth);
+    for (const Wall& wall : sample.walls) walls.push_back(add_wall(world, wall, material));
     return world;
 }
 
@@ -199,16 +219,19 @@ void pour(Grains& grains, const Spec& spec, std::uint64_t seed, Keeper& keeper)
         smallest = std::min(smallest, equivalent_diameter(sample, p));
     }
     const std::vector<Batch> batches = make_batches(sample, radius, spec, random);
-    dem::World world = soft_world(sample, spec, shapes);
+    check_periods(spec, radius);
+    sample.walls = walls_around(spec, std::numeric_limits<double>::infinity());  // no lid
+    std::vector<int> walls;
+    dem::World world = soft_world(sample, spec, shapes, walls);
+    const Box box(sample, walls);
     bool placed = keeper.resumes(Phase::pouring);
     if (placed) resume(world, sample, batches, random, keeper);
     const double limit = spec.dropping.speed_ratio * std::sqrt(spec.gravity.norm() * smallest);
     std::vector<int> grain_of_body;
     for (const Batch& batch : batches) grain_of_body.insert(grain_of_body.end(), batch.begin(), batch.end());
     const auto check = [&] {
-        const Eigen::Vector3d upper(spec.size.x(), spec.size.y(), std::numeric_limits<double>::infinity());
         for (int i = 0; i < world.body_count(); ++i)
-            check_inside(world, i, grain_of_body[std::size_t(i)], Eigen::Vector3d::Zero(), upper, "pouring", "raise [dropping] stiffness_factor or layers, or lower drop_height");
+            box.check_inside(world, i, grain_of_body[std::size_t(i)], "pouring", "raise [dropping] stiffness_factor or layers, or lower drop_height");
     };
     Progress progress("pouring", double(batches.size()), keeper.state.batch);
     for (std::size_t b = std::size_t(keeper.state.batch); b < batches.size(); ++b) {

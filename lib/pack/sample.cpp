@@ -1,7 +1,11 @@
 #include "pack/sample.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
+
+#include "core/error.h"
+#include "core/units.h"
 
 namespace coral::pack {
 
@@ -36,6 +40,39 @@ double apparent_volume(const Sample& sample, const Particle& particle)
 double equivalent_diameter(const Sample& sample, const Particle& particle)
 {
     return sample.shapes[std::size_t(particle.shape)].equivalent_diameter * particle.scale;
+}
+
+const Wall* cylinder(const Sample& sample)
+{
+    const auto found = std::find_if(sample.walls.begin(), sample.walls.end(), [](const Wall& wall) { return wall.radius > 0; });
+    return found == sample.walls.end() ? nullptr : &*found;
+}
+
+double enclosed_volume(const Sample& sample)
+{
+    const Wall* side = cylinder(sample);
+    return side ? std::numbers::pi * side->radius * side->radius * sample.size.z() : sample.size.prod();
+}
+
+Eigen::Vector3d nearest_image(const Sample& sample, Eigen::Vector3d difference)
+{
+    for (int axis = 0; axis < 3; ++axis)
+        if (const double length = sample.period[axis]; length > 0) difference[axis] -= length * std::nearbyint(difference[axis] / length);
+    return difference;
+}
+
+std::string describe_enclosure(const Sample& sample)
+{
+    const auto length = [](double metres) { return format_quantity(metres, Dimension::length); };
+    if (const Wall* side = cylinder(sample)) return "a cylinder of " + length(2 * side->radius) + ", " + length(sample.size.z()) + " high";
+    const bool x = sample.period.x() > 0, y = sample.period.y() > 0;
+    return length(sample.size.x()) + " x " + length(sample.size.y()) + " x " + length(sample.size.z()) +
+           (x && y ? ", periodic along x and y" : x ? ", periodic along x" : y ? ", periodic along y" : "");
+}
+
+void refuse_cylinder(const Sample& sample, const std::string& who)
+{
+    if (cylinder(sample)) throw Error("sample", "lies in a cylinder, and " + who + " takes boxes only", "pack it with [box] in place of [cylinder]");
 }
 
 ShapeTemplate unit_sphere()

@@ -65,13 +65,14 @@ struct Particle {
     std::int32_t material = 0;  ///< index into Sample::materials
 };
 
-/// Plane wall of the box; the normal points into the sample.
+/// Plane wall of the box, whose normal points into the sample; or a cylinder about z around it.
 struct Wall {
-    std::string name;  ///< "x-", "x+", "y-", "y+", "z-", "z+"
+    std::string name;  ///< "x-", "x+", "y-", "y+", "z-", "z+"; "side" of a cylinder
     Eigen::Vector3d point = Eigen::Vector3d::Zero();    ///< [m]
     Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  ///< [-]
     double friction = 0;  ///< of the wall during the packing [-]
     double pressure = 0;  ///< mean normal pressure of the bodies on the wall at the end of the packing [Pa]
+    double radius = 0;    ///< of a cylinder whose axis, along `normal`, goes through `point`; 0: a plane [m]
 };
 
 /// Point of a gradation curve.
@@ -107,7 +108,7 @@ struct Statistics {
     double kinetic_ratio = 0;           ///< kinetic energy of the mean motion over the last 500 steps / elastic energy of the contacts [-]
     double kinetic_energy = 0;          ///< of the last step [J]
     double unbalanced_ratio = 0;        ///< mean |net force| on a touching grain, mean over 500 steps / mean normal contact force [-]
-    double mean_pressure = 0;           ///< over the walls [Pa]
+    double mean_pressure = 0;           ///< over the walls; a cylinder counts as the four sides of a box [Pa]
     double max_overlap = 0;             ///< greatest depth / equivalent diameter of the smaller grain [-]
     double max_wall_overlap = 0;
     double dem_steps = 0;               ///< steps of the whole packing
@@ -118,7 +119,9 @@ struct Sample {
     std::vector<Particle> particles;
     std::vector<ShapeTemplate> shapes;
     std::vector<Material> materials;
-    Eigen::Vector3d size = Eigen::Vector3d::Zero();     ///< box from the origin to here [m]
+    Eigen::Vector3d size = Eigen::Vector3d::Zero();     ///< box from the origin to here; around a cylinder it is the least one [m]
+    /// Lengths after which the sample repeats itself along x, y, z, those of the box; 0: it has walls there [m]. Positions lie within.
+    Eigen::Vector3d period = Eigen::Vector3d::Zero();
     Eigen::Vector3d gravity = {0, 0, -9.81};            ///< in the final state [m/s2]
     std::vector<Wall> walls;
     std::vector<Contact> contacts;
@@ -134,6 +137,18 @@ double mass(const Sample& sample, const Particle& particle);
 double volume(const Sample& sample, const Particle& particle);
 double apparent_volume(const Sample& sample, const Particle& particle);
 double equivalent_diameter(const Sample& sample, const Particle& particle);
+
+/// The cylinder around the sample; null for a box.
+const Wall* cylinder(const Sample& sample);
+/// Space within the walls [m3].
+double enclosed_volume(const Sample& sample);
+/// Difference of two positions, by the nearest image in a periodic sample.
+Eigen::Vector3d nearest_image(const Sample& sample, Eigen::Vector3d difference);
+/// "60 mm x 60 mm x 58 mm, periodic along x and y", "a cylinder of 50 mm, 42 mm high".
+std::string describe_enclosure(const Sample& sample);
+/// One clear refusal for what takes boxes with six walls only.
+/// \throws Error  a cylinder: \p who cannot take it, and what to do
+void refuse_cylinder(const Sample& sample, const std::string& who);
 
 /// Unit template of spheres (diameter 1 m).
 ShapeTemplate unit_sphere();

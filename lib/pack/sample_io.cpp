@@ -327,7 +327,8 @@ void read_walls(const Reader& in, Sample& sample)
     const auto name = in.strings("/walls/name", n);
     const auto point = in.numbers("/walls/point", n, 3), normal = in.numbers("/walls/normal", n, 3),
                friction = in.numbers("/walls/friction", n), pressure = in.numbers("/walls/pressure", n);
-    for (std::size_t i = 0; i < n; ++i) sample.walls.push_back({name[i], row3(point, i), row3(normal, i), friction[i], pressure[i]});
+    const auto radius = in.file().exists("/walls/radius") ? in.numbers("/walls/radius", n) : std::vector<double>(n, 0.0);
+    for (std::size_t i = 0; i < n; ++i) sample.walls.push_back({name[i], row3(point, i), row3(normal, i), friction[i], pressure[i], radius[i]});
 }
 
 void check_indices(const Sample& sample, const std::filesystem::path& file)
@@ -352,7 +353,8 @@ void write_sample(const Sample& sample, const std::filesystem::path& path)
     check_indices(sample, path);
     H5File file = H5File::create(path);
     file.set_attribute("/", "content", content);
-    file.set_format(file_format::sample);
+    const bool periodic = !sample.period.isZero(0);
+    file.set_format(periodic || cylinder(sample) ? file_format::sample : 1);
     file.set_attribute("/", "size", std::span<const double>(sample.size.data(), 3));
     file.set_attribute("/", "gravity", std::span<const double>(sample.gravity.data(), 3));
     for (std::size_t k = 0; k < sample.shapes.size(); ++k) write_shape(file, "/shapes/" + std::to_string(k), sample.shapes[k]);
@@ -363,6 +365,8 @@ void write_sample(const Sample& sample, const std::filesystem::path& path)
     write_rows(file, "/walls/normal", rows(sample.walls, [](const Wall& w) { return w.normal; }));
     write_column(file, "/walls/friction", column<double>(sample.walls, [](const Wall& w) { return w.friction; }));
     write_column(file, "/walls/pressure", column<double>(sample.walls, [](const Wall& w) { return w.pressure; }));
+    if (periodic) file.set_attribute("/", "period", std::span<const double>(sample.period.data(), 3));
+    if (cylinder(sample)) write_column(file, "/walls/radius", column<double>(sample.walls, [](const Wall& w) { return w.radius; }));
     write_contacts(file, sample.contacts, sample.springs);
     write_column(file, "/psd/size", column<double>(sample.psd, [](const PsdPoint& p) { return p.size; }));
     write_column(file, "/psd/passing", column<double>(sample.psd, [](const PsdPoint& p) { return p.passing; }));
@@ -389,6 +393,11 @@ Sample read_sample(const std::filesystem::path& path)
     if (size.size() != 3 || gravity.size() != 3) in.fail("/", "attributes size and gravity need three numbers");
     sample.size = row3(size, 0);
     sample.gravity = row3(gravity, 0);
+    if (file.has_attribute("/", "period")) {
+        const auto period = file.numbers_attribute("/", "period");
+        if (period.size() != 3 || !(*std::min_element(period.begin(), period.end()) >= 0)) in.fail("/", "attribute period needs three lengths");
+        sample.period = row3(period, 0);
+    }
     for (const std::string& k : file.members("/shapes")) sample.shapes.push_back(read_shape(in, "/shapes/" + k));
     read_materials(file, sample);
     read_particles(in, sample);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <set>
 
 #include "core/config.h"
@@ -200,64 +201,106 @@ Population read_population(const ConfigTable& table, const std::filesystem::path
     return p;
 }
 
+/// Reads a number over its default; `sign` says what it must not be.
+enum class Sign { positive, not_negative };
+void read_over(const ConfigTable& table, const char* key, Dimension dimension, Sign sign, double& value)
+{
+    const double given = table.quantity(key, dimension, value);
+    if (sign == Sign::positive) require_positive(table, key, given);
+    else if (table.has(key) && given < 0) table.error(key, "is negative");
+    value = given;
+}
+
 Dropping read_dropping(const ConfigTable& table)
 {
     Dropping d;
     d.layers = static_cast<int>(table.integer("layers", d.layers));
-    d.drop_height = table.quantity("drop_height", Dimension::length, d.drop_height);
-    d.friction = table.quantity("friction", Dimension::number, d.friction);
-    d.damping = table.quantity("damping", Dimension::number, d.damping);
-    d.stiffness_factor = table.quantity("stiffness_factor", Dimension::number, d.stiffness_factor);
-    d.drag = table.quantity("drag", Dimension::number, d.drag);
-    d.unbalanced_ratio = table.quantity("unbalanced_ratio", Dimension::number, d.unbalanced_ratio);
-    d.speed_ratio = table.quantity("speed_ratio", Dimension::number, d.speed_ratio);
-    d.time_limit = table.quantity("time_limit", Dimension::time, d.time_limit);
     if (d.layers < 0) table.error("layers", "is negative");
-    if (d.drop_height < 0) table.error("drop_height", "is negative");
-    if (d.friction < 0) table.error("friction", "is negative");
-    if (d.drag < 0) table.error("drag", "is negative");
+    read_over(table, "drop_height", Dimension::length, Sign::not_negative, d.drop_height);
+    read_over(table, "friction", Dimension::number, Sign::not_negative, d.friction);
+    read_over(table, "drag", Dimension::number, Sign::not_negative, d.drag);
+    d.damping = table.quantity("damping", Dimension::number, d.damping);
     require_share(table, "damping", d.damping, true);
+    d.stiffness_factor = table.quantity("stiffness_factor", Dimension::number, d.stiffness_factor);
     if (!(d.stiffness_factor > 0 && d.stiffness_factor <= 1))
         table.error("stiffness_factor", "must be greater than 0 and at most 1, is " + to_text(d.stiffness_factor));
-    require_positive(table, "unbalanced_ratio", d.unbalanced_ratio);
-    require_positive(table, "speed_ratio", d.speed_ratio);
-    require_positive(table, "time_limit", d.time_limit);
+    read_over(table, "unbalanced_ratio", Dimension::number, Sign::positive, d.unbalanced_ratio);
+    read_over(table, "speed_ratio", Dimension::number, Sign::positive, d.speed_ratio);
+    read_over(table, "time_limit", Dimension::time, Sign::positive, d.time_limit);
     return d;
 }
 
-Compression read_compression(const ConfigTable& table)
+/// Which walls close in, by default all that can.
+MovingWalls read_walls(const ConfigTable& table, const Spec& spec)
 {
-    static const std::array<std::string, 2> walls{"all", "top"};
+    static const std::array<std::string, 3> names{"all", "platens", "top"};
+    const bool sides = !spec.cylinder && !(spec.period.x() > 0 && spec.period.y() > 0);
+    const std::string walls = table.choice("walls", names, sides ? "all" : "platens");
+    if (walls == "all" && !sides)
+        table.error("walls", std::string("is \"all\", and the side of ") + (spec.cylinder ? "a cylinder does not move" : "a periodic box has no walls"), "write \"platens\" (top and base) or \"top\"");
+    return walls == "all" ? MovingWalls::all : walls == "top" ? MovingWalls::top : MovingWalls::platens;
+}
+
+Compression read_compression(const ConfigTable& table, const Spec& spec)
+{
     Compression c;
     if (table.has("pressure") && table.has("void_ratio"))
         table.error("void_ratio", "pressure and void_ratio are both given", "keep one of them");
     if (table.has("pressure")) {
         c.target = CompressionTarget::pressure;
-        c.pressure = table.quantity("pressure", Dimension::pressure);
-        require_positive(table, "pressure", c.pressure);
+        read_over(table, "pressure", Dimension::pressure, Sign::positive, c.pressure);
     } else if (table.has("void_ratio")) {
         c.target = CompressionTarget::void_ratio;
-        c.void_ratio = table.quantity("void_ratio", Dimension::number);
-        require_positive(table, "void_ratio", c.void_ratio);
+        read_over(table, "void_ratio", Dimension::number, Sign::positive, c.void_ratio);
     }
-    c.lateral = table.choice("walls", walls, "all") == "all";
-    c.friction = table.quantity("friction", Dimension::number, c.friction);
-    c.max_velocity = table.quantity("max_velocity", Dimension::velocity, c.max_velocity);
-    c.tolerance = table.quantity("tolerance", Dimension::number, c.tolerance);
-    c.unbalanced_ratio = table.quantity("unbalanced_ratio", Dimension::number, c.unbalanced_ratio);
-    c.kinetic_ratio = table.quantity("kinetic_ratio", Dimension::number, c.kinetic_ratio);
-    c.time_limit = table.quantity("time_limit", Dimension::time, c.time_limit);
-    c.relaxation_limit = table.quantity("relaxation_limit", Dimension::time, c.relaxation_limit);
-    c.drag = table.quantity("drag", Dimension::number, c.drag);
-    if (table.has("friction") && c.friction < 0) table.error("friction", "is negative");
-    if (c.drag < 0) table.error("drag", "is negative");
-    require_positive(table, "max_velocity", c.max_velocity);
-    require_positive(table, "tolerance", c.tolerance);
-    require_positive(table, "unbalanced_ratio", c.unbalanced_ratio);
-    require_positive(table, "kinetic_ratio", c.kinetic_ratio);
-    require_positive(table, "time_limit", c.time_limit);
-    require_positive(table, "relaxation_limit", c.relaxation_limit);
+    c.walls = read_walls(table, spec);
+    read_over(table, "friction", Dimension::number, Sign::not_negative, c.friction);
+    read_over(table, "max_velocity", Dimension::velocity, Sign::positive, c.max_velocity);
+    read_over(table, "tolerance", Dimension::number, Sign::positive, c.tolerance);
+    read_over(table, "unbalanced_ratio", Dimension::number, Sign::positive, c.unbalanced_ratio);
+    read_over(table, "kinetic_ratio", Dimension::number, Sign::positive, c.kinetic_ratio);
+    read_over(table, "time_limit", Dimension::time, Sign::positive, c.time_limit);
+    read_over(table, "relaxation_limit", Dimension::time, Sign::positive, c.relaxation_limit);
+    read_over(table, "drag", Dimension::number, Sign::not_negative, c.drag);
     return c;
+}
+
+/// Sides of the box where it repeats itself.
+void read_periodic(const ConfigTable& box, Spec& spec)
+{
+    for (const std::string& side : box.strings("periodic", std::vector<std::string>{})) {
+        if (side != "x" && side != "y")
+            box.error("periodic", "has '" + side + "'", side == "z" ? "grains fall along z and platens press on it: take x, y or both" : "write [\"x\", \"y\"] or one of them");
+        else spec.period[side == "x" ? 0 : 1] = spec.size[side == "x" ? 0 : 1];
+    }
+}
+
+/// [box] or [cylinder].
+void read_enclosure(const ConfigTable& root, Spec& spec)
+{
+    spec.cylinder = root.has("cylinder");
+    if (spec.cylinder) {
+        const ConfigTable cylinder = root.table("cylinder");
+        if (root.has("box")) {
+            cylinder.error("diameter", "stands beside a [box]", "keep one of them");
+            root.table("box").keys();
+        }
+        double diameter = 0, height = 0;
+        for (const auto& [key, value] : {std::pair{"diameter", &diameter}, {"height", &height}}) {
+            *value = cylinder.quantity(key, Dimension::length);
+            if (cylinder.has(key)) require_positive(cylinder, key, *value);
+        }
+        spec.size = {diameter, diameter, height};
+        spec.box_key = "cylinder.diameter";
+        spec.box_location = cylinder.location("diameter");
+        return;
+    }
+    const ConfigTable box = root.table("box");
+    spec.size = box.vector("size", Dimension::length);
+    spec.box_key = "box.size";
+    spec.box_location = box.location("size");
+    if (box.has("size") && !(spec.size.minCoeff() > 0)) box.error("size", "every edge must be greater than zero");
+    read_periodic(box, spec);
 }
 
 std::optional<DensityLimits> read_density(const ConfigTable& table)
@@ -286,8 +329,8 @@ void check_together(const std::vector<ConfigTable>& tables, const ConfigTable& r
             tables[i].error("material", "there is no [material." + p.material + "]" + did_you_mean(p.material, names));
         const double edge = spec.size.minCoeff();
         if (p.largest >= edge && edge > 0)
-            tables[i].error(tables[i].has("psd") ? "psd" : tables[i].has("diameters") ? "diameters" : "diameter", "grains of " + format_quantity(p.largest, Dimension::length) + " do not fit a box of " +
-                                            format_quantity(edge, Dimension::length), "enlarge [box] size");
+            tables[i].error(tables[i].has("psd") ? "psd" : tables[i].has("diameters") ? "diameters" : "diameter", "grains of " + format_quantity(p.largest, Dimension::length) + std::string(spec.cylinder ? " do not fit a cylinder of " : " do not fit a box of ") +
+                                            format_quantity(edge, Dimension::length), "enlarge [" + spec.box_key.substr(0, spec.box_key.find('.')) + "]");
     }
     if (spec.populations.empty()) {
         root.error("population", "there is no [[population]]", "add at least one");
@@ -302,16 +345,15 @@ void check_together(const std::vector<ConfigTable>& tables, const ConfigTable& r
 
 }  // namespace
 
+double base_area(const Spec& spec) { return (spec.cylinder ? std::numbers::pi / 4 : 1.0) * spec.size.x() * spec.size.y(); }
+
 Spec read_spec(const std::filesystem::path& file, const std::filesystem::path& grains)
 {
     const Config config = Config::from_file(file);
     const ConfigTable root = config.root();
     Spec spec;
     spec.text = read_text_file(file);
-    const ConfigTable box = root.table("box");
-    spec.size = box.vector("size", Dimension::length);
-    spec.box_location = box.location("size");
-    if (box.has("size") && !(spec.size.minCoeff() > 0)) box.error("size", "every edge must be greater than zero");
+    read_enclosure(root, spec);
     const ConfigTable materials = root.table("material");
     for (const std::string& name : materials.keys()) spec.materials.push_back(read_material(materials.table(name), name));
     if (spec.materials.empty()) spec.materials.push_back({});
@@ -319,7 +361,7 @@ Spec read_spec(const std::filesystem::path& file, const std::filesystem::path& g
     for (std::size_t i = 0; i < tables.size(); ++i)
         spec.populations.push_back(read_population(tables[i], file.parent_path(), grains, i));
     spec.dropping = read_dropping(root.table("dropping"));
-    spec.compression = read_compression(root.table("compression"));
+    spec.compression = read_compression(root.table("compression"), spec);
     spec.density = read_density(root.table("density"));
     spec.gravity = root.table("gravity").vector("vector", Dimension::acceleration, spec.gravity);
     if (!(spec.gravity.z() < 0)) root.table("gravity").error("vector", "grains are dropped along -z, so z must be negative");

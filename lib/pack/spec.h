@@ -63,12 +63,15 @@ struct Dropping {
 
 enum class CompressionTarget { none, pressure, void_ratio };
 
+/// Which walls close in: all planes that there are, top and base alone (platens), or the top alone.
+enum class MovingWalls { all, platens, top };
+
 /// Walls move at true stiffness and density, then stand still for the final relaxation.
 struct Compression {
     CompressionTarget target = CompressionTarget::none;
     double pressure = 0;             ///< [Pa]
     double void_ratio = 0;           ///< interparticle [-]
-    bool lateral = true;             ///< all six walls move; false: only the top, the base keeps its size
+    MovingWalls walls = MovingWalls::all;
     double friction = -1;            ///< while walls move [-]; negative: the material's
     double max_velocity = 0.2;       ///< of a wall [m/s]
     double tolerance = 0.02;         ///< of the mean pressure of each pair of walls, relative [-]
@@ -86,13 +89,15 @@ struct DensityLimits {
 
 struct Spec {
     std::string text;  ///< of the file
-    Eigen::Vector3d size = Eigen::Vector3d::Zero();  ///< box the grains are dropped into; z is the height the grains should fill [m]
+    Eigen::Vector3d size = Eigen::Vector3d::Zero();  ///< box the grains are dropped into, or around the cylinder; z is the height they should fill [m]
+    bool cylinder = false;                             ///< of diameter size.x about z, in place of the box
+    Eigen::Vector3d period = Eigen::Vector3d::Zero();  ///< of the sides without walls: that of `size`; else 0 [m]
     std::vector<Material> materials;
     std::vector<Population> populations;
     Dropping dropping;
     Compression compression;
     std::optional<DensityLimits> density;
-    std::string box_location;  ///< "file:line:column" of the size of the box, for errors found later
+    std::string box_location, box_key;  ///< "file:line:column" and name of the size of the box, for errors found later
     double dem_step = 0;     ///< [s]; 0: automatic
     bool force_step = false;   ///< takes a step above the critical one, too
     bool all_walls = false;    ///< spheres press on every wall of a level set that they reach: dem::SphereScheme::walls
@@ -100,6 +105,9 @@ struct Spec {
     Eigen::Vector3d gravity = {0, 0, -9.81};
     std::vector<std::string> warnings;  ///< odd but allowed, for the user to read
 };
+
+/// Section of the box or cylinder [m2].
+double base_area(const Spec& spec);
 
 /// Reads and checks a specification; relative paths in it are relative to its folder.
 /// \param grains  when given, takes the place of `file` in every level-set population

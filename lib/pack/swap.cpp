@@ -62,7 +62,7 @@ std::vector<char> trapped_fines(Sample& sample, const Sample& before, bool move)
         for (const std::size_t c : hosts) {
             const Particle& host = sample.particles[c];
             const dem::Shape& shape = *shapes[host.shape];
-            Vec3 local = host.orientation.conjugate() * (fine.position - host.position) / host.scale;
+            Vec3 local = host.orientation.conjugate() * nearest_image(sample, fine.position - host.position) / host.scale;
             if (local.norm() > shape.bounding_radius() || shape.distance(local) >= 0) continue;
             trapped[i] = 1;
             for (int k = 0; move && k < 50; ++k) {

@@ -1,5 +1,6 @@
 // Relaxation of a sample whose grains have new shapes, and what it did.
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "core/error.h"
@@ -79,9 +80,7 @@ double change_of_forces(const dem::World& a, const dem::World& b)
 
 dem::World world_of(const Sample& sample, SampleIds& ids)
 {
-    dem::WorldOptions options;
-    options.gravity = sample.gravity;
-    dem::World world(options);
+    dem::World world(world_options(sample));
     ids = add_sample(world, sample);
     restore_springs(world, sample, ids);
     return world;
@@ -141,7 +140,11 @@ class WallServo {
 public:
     WallServo(const dem::World& world, const Box& box, const Sample& before) : box_(box)
     {
-        for (std::size_t w = 0; w < 6; ++w) pressure_[w] = before.walls[w].pressure;
+        const std::array planes{"x-", "x+", "y-", "y+", "z-", "z+"};
+        for (const Wall& wall : before.walls)
+            for (std::size_t w = 0; w < planes.size(); ++w)
+                if (wall.name == planes[w]) pressure_[w] = wall.pressure;
+        mean_ = before.statistics.mean_pressure;
         for (int i = 0; i < world.body_count(); ++i) mass_ += world.mass(i);
         for (const Material& m : before.materials) stiffness_ = std::max(stiffness_, m.normal_stiffness);
     }
@@ -150,16 +153,16 @@ public:
     double serve(dem::World& world)
     {
         const Eigen::Vector3d size = box_.upper(world) - box_.lower(world);
-        const auto contacts = wall_contacts(world, box_);
-        double worst = 0, mean = 0;
-        for (const double p : pressure_) mean += p / 6;
+        const auto contacts = box_.contacts(world);
+        double worst = 0;
         for (int axis = 0; axis < 3; ++axis) {
+            if (!box_.has_planes(axis)) continue;
             const std::size_t low = 2 * std::size_t(axis), high = low + 1;
             const bool both = axis < 2;  // the bottom also carries the weight
             const double wanted = both ? 0.5 * (pressure_[low] + pressure_[high]) : pressure_[high];
             const double now = both ? 0.5 * (box_.pressure(world, int(low)) + box_.pressure(world, int(high))) : box_.pressure(world, int(high));
-            worst = std::max(worst, std::abs(wanted - now) / std::max(wanted, 0.1 * mean));
-            const double speed = servo_speed(wanted - now, size.prod() / size[axis], size[axis], std::min(contacts[low], contacts[high]), stiffness_, mass_, fastest_wall);
+            worst = std::max(worst, std::abs(wanted - now) / std::max(wanted, 0.1 * mean_));
+            const double speed = servo_speed(wanted - now, box_.area(world, axis), size[axis], std::min(contacts[low], contacts[high]), stiffness_, mass_, fastest_wall);
             set_pair_speed(world, box_, axis, speed, both);
         }
         return worst;
@@ -168,7 +171,7 @@ public:
 private:
     Box box_;
     std::array<double, 6> pressure_{};
-    double mass_ = 0, stiffness_ = 0;
+    double mass_ = 0, stiffness_ = 0, mean_ = 0;
 };
 
 void settle(dem::World& world, const Sample& sample, const Sample& before, const Box& box, const std::vector<char>& loaded, const SwapOptions& options, SwapReport& report)
@@ -243,8 +246,7 @@ void check(const dem::World& world, const Box& box, const SwapOptions& options, 
         throw Error("swap", "the skeleton does not hold: a coarse grain moved by " + percent(report.coarse.largest) + " of its diameter (--limit is " + percent(options.limit) + ")", help);
     if (report.fine.mean > options.limit)
         throw Error("swap", "fine grains moved by " + percent(report.fine.mean) + " of their diameter on average (--limit is " + percent(options.limit) + ")", help);
-    const Eigen::Vector3d lower = box.lower(world), upper = box.upper(world);
-    for (int i = 0; i < world.body_count(); ++i) check_inside(world, i, i, lower, upper, "swap", help.c_str());
+    for (int i = 0; i < world.body_count(); ++i) box.check_inside(world, i, i, "swap", help.c_str());
 }
 
 }  // namespace
@@ -257,7 +259,7 @@ void relax_swapped(Replaced& swapped, const Sample& before, const std::vector<ch
     dem::World old = world_of(before, ids), world = world_of(sample, ids);
     evaluate(old);
     evaluate(world);
-    const Box box{ids.walls.front()};
+    const Box box(sample, ids.walls);
     const double allowed = std::max(2 * old.statistics().max_overlap, harmless_overlap);
     report.before = overlaps(old);
     report.swapped = overlaps(world);

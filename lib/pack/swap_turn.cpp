@@ -35,6 +35,7 @@ std::vector<Vec3> outline(const dem::Shape& shape, std::size_t most)
 struct Neighbour {
     const dem::Shape* shape = nullptr;  ///< none: a wall
     Vec3 position = Vec3::Zero(), normal = Vec3::Zero();  ///< of its centre, or of the wall
+    double radius = 0;                  ///< of a wall that is a cylinder
     Quat turned_back = Quat::Identity();
     double scale = 1;
     double target = std::numeric_limits<double>::infinity();  ///< signed clearance to keep; infinite: any that is not negative
@@ -61,10 +62,10 @@ public:
         std::vector<Neighbour> near;
         for (std::size_t j = 0; j < sample_.particles.size(); ++j) {
             const Particle& q = sample_.particles[j];
-            if (j == i || (p.position - q.position).norm() > bounding(p) + bounding(q)) continue;
+            if (j == i || nearest_image(sample_, p.position - q.position).norm() > bounding(p) + bounding(q)) continue;
             Neighbour n;
             n.shape = shapes_[std::size_t(q.shape)].get();
-            n.position = q.position - p.position;
+            n.position = nearest_image(sample_, q.position - p.position);
             n.turned_back = q.orientation.conjugate();
             n.scale = q.scale;
             n.target = target(i, int(j));
@@ -78,8 +79,9 @@ public:
             Neighbour n;
             n.position = wall.point - p.position;
             n.normal = wall.normal;
+            n.radius = wall.radius;
             n.target = target(i, -1 - int(w));
-            if (-n.normal.dot(n.position) < (1 + in_reach) * bounding(p)) near.push_back(std::move(n));
+            if (to_wall(n, Vec3::Zero()) < (1 + in_reach) * bounding(p)) near.push_back(std::move(n));
         }
         return near;
     }
@@ -131,6 +133,11 @@ private:
         return std::max(first, separation(b, n.scale, corners));
     }
 
+    static double to_wall(const Neighbour& n, const Vec3& x)
+    {
+        return n.radius > 0 ? n.radius - (x - n.position).head<2>().norm() : n.normal.dot(x - n.position);
+    }
+
     /// Least distance between the surfaces, negative where they overlap.
     double clearance(const Particle& p, const Quat& turn, const Neighbour& n) const
     {
@@ -138,7 +145,7 @@ private:
         const std::vector<Vec3>& points = outline_[std::size_t(p.shape)];
         double least = std::numeric_limits<double>::infinity();
         if (!n.shape) {
-            for (const Vec3& x : points) least = std::min(least, n.normal.dot(turn * (p.scale * x) - n.position));
+            for (const Vec3& x : points) least = std::min(least, to_wall(n, turn * (p.scale * x)));
             return least;
         }
         const Quat back = turn.conjugate();

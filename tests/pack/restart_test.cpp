@@ -88,6 +88,13 @@ std::string refusal(const std::string& text, std::uint64_t seed, const std::file
 TEST(PackRestart, goes_on_bit_for_bit_to_a_pressure) { expect_same_in_parts(pressed, 13, 5); }
 TEST(PackRestart, goes_on_bit_for_bit_to_a_void_ratio) { expect_same_in_parts(densified, 29, 5); }
 
+TEST(PackRestart, goes_on_bit_for_bit_in_a_cylinder_and_across_periodic_sides)
+{
+    const auto in = [](const std::string& enclosure, std::string text) { return text.replace(0, text.find("[[population]]"), enclosure); };
+    expect_same_in_parts(in("[cylinder]\ndiameter = \"9mm\"\nheight = \"12mm\"\n", pressed), 13, 5);
+    expect_same_in_parts(in("[box]\nsize = [\"8mm\", \"8mm\", \"12mm\"]\nperiodic = [\"x\", \"y\"]\n", densified), 29, 5);
+}
+
 TEST(PackRestart, refuses_checkpoints_of_other_packings)
 {
     const auto checkpoint = stopped();

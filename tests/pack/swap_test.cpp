@@ -57,21 +57,23 @@ coral::sdf::GrainLevelSet lopsided_capsule(int id)
 }
 
 /// Six of the capsules among about forty spheres of 1 mm, pressed at 2 kPa; packed once.
+Sample packed_in(const std::string& enclosure)
+{
+    coral::Progress::set_quiet(true);
+    const std::vector grains{lopsided_capsule(1)};
+    coral::sdf::write_grains(scratch("grains.vdb"), grains, {});
+    coral::write_text_file(scratch("swap.toml"),
+                           enclosure + "[[population]]\nrole = \"coarse\"\nshape = \"level-set\"\nfile = \"grains.vdb\"\ncount = 6\nsurface_nodes = 1500\n"
+                                       "[[population]]\nrole = \"fine\"\ndiameter = \"1mm\"\nmass_fraction = 0.15\n"
+                                       "[material.default]\nnormal_stiffness = 2e4\ntangential_stiffness = 1e4\nfriction = 0.3\n"
+                                       "[dropping]\ntime_limit = \"50ms\"\n[compression]\npressure = \"2kPa\"\ntime_limit = \"0.2s\"\nrelaxation_limit = \"50ms\"\n");
+    PackReport report;
+    return pack(read_spec(scratch("swap.toml")), 1, report);
+}
+
 const Sample& packed()
 {
-    static const Sample sample = [] {
-        coral::Progress::set_quiet(true);
-        const std::vector grains{lopsided_capsule(1)};
-        coral::sdf::write_grains(scratch("grains.vdb"), grains, {});
-        coral::write_text_file(scratch("swap.toml"),
-                               "[box]\nsize = [\"8mm\", \"8mm\", \"12mm\"]\n"
-                               "[[population]]\nrole = \"coarse\"\nshape = \"level-set\"\nfile = \"grains.vdb\"\ncount = 6\nsurface_nodes = 1500\n"
-                               "[[population]]\nrole = \"fine\"\ndiameter = \"1mm\"\nmass_fraction = 0.15\n"
-                               "[material.default]\nnormal_stiffness = 2e4\ntangential_stiffness = 1e4\nfriction = 0.3\n"
-                               "[dropping]\ntime_limit = \"50ms\"\n[compression]\npressure = \"2kPa\"\ntime_limit = \"0.2s\"\nrelaxation_limit = \"50ms\"\n");
-        PackReport report;
-        return pack(read_spec(scratch("swap.toml")), 1, report);
-    }();
+    static const Sample sample = packed_in("[box]\nsize = [\"8mm\", \"8mm\", \"12mm\"]\n");
     return sample;
 }
 
@@ -188,6 +190,33 @@ TEST(SwapShapes, fines_become_angular_at_the_same_places_for_any_number_of_threa
         if (one.particles[i].role == Role::coarse) continue;
         EXPECT_EQ(one.shapes[std::size_t(one.particles[i].shape)].kind, ShapeKind::polyhedron);
         EXPECT_NEAR(volume(one, one.particles[i]), volume(packed(), packed().particles[i]), 1e-9 * volume(one, one.particles[i]));
+    }
+}
+
+TEST(SwapShapes, a_cylinder_and_periodic_sides_stay_what_they_are)
+{
+    for (const char* enclosure : {"[cylinder]\ndiameter = \"9mm\"\nheight = \"12mm\"\n", "[box]\nsize = [\"11mm\", \"11mm\", \"12mm\"]\nperiodic = [\"x\", \"y\"]\n"}) {
+        const Sample before = packed_in(enclosure);
+        SwapOptions options;
+        options.fine = ShapeKind::polyhedron;
+        options.faces = 20;
+        options.max_steps = 3000;
+        SwapReport report;
+        const Sample after = swap_shapes(before, options, 7, report);
+        EXPECT_LT(report.fine.mean, 0.1) << enclosure;
+        EXPECT_LT(report.coarse.largest, 0.1) << enclosure;
+        EXPECT_LT(report.kinetic_energy, 1e-8) << enclosure;
+        EXPECT_EQ(after.period, before.period);
+        EXPECT_EQ(after.size.head<2>(), before.size.head<2>());
+        EXPECT_EQ(after.walls.size(), before.walls.size());
+        EXPECT_EQ(cylinder(after) != nullptr, cylinder(before) != nullptr);
+        for (std::size_t i = 0; i < after.particles.size(); ++i) {
+            const Vec3 way = nearest_image(before, after.particles[i].position - before.particles[i].position);
+            EXPECT_LT(way.norm(), 1e-3) << i;
+            if (const Wall* side = cylinder(after)) {
+                EXPECT_LT((after.particles[i].position - side->point).head<2>().norm(), side->radius) << i;
+            }
+        }
     }
 }
 

@@ -20,7 +20,8 @@ Report describe_sample(const std::filesystem::path& file)
     std::vector<double> coarse, fine;
     for (const pack::Particle& p : sample.particles) (p.role == pack::Role::fine ? fine : coarse).push_back(pack::equivalent_diameter(sample, p));
     report.add("bodies", sample.particles.size(), fmt::format("{} coarse, {} fine", coarse.size(), fine.size()));
-    report.add("size", {sample.size.x(), sample.size.y(), sample.size.z()}, fmt::format("{} x {} x {}", metres(sample.size.x()), metres(sample.size.y()), metres(sample.size.z())));
+    report.add("size", {sample.size.x(), sample.size.y(), sample.size.z()}, pack::describe_enclosure(sample));
+    if (!sample.period.isZero(0)) report.add("period", {sample.period.x(), sample.period.y(), sample.period.z()}, fmt::format("{}, {}, {} (0: walls)", metres(sample.period.x()), metres(sample.period.y()), metres(sample.period.z())));
     report.lengths("coarse_diameter", coarse);
     report.lengths("fine_diameter", fine);
     report.share("porosity", sample.statistics.porosity);

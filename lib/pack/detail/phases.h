@@ -1,11 +1,11 @@
 #pragma once
 /// \file pack/detail/phases.h
 /// The phases of a packing (pack/pack.h), one function each.
-#include <array>
 #include <string>
 #include <vector>
 
 #include "dem/world.h"
+#include "pack/detail/box.h"
 #include "pack/detail/keeper.h"
 #include "pack/pack.h"
 #include "pack/populations.h"
@@ -50,20 +50,6 @@ private:
     double first_ = 0;
 };
 
-/// Box of the sample as planes of a world: walls `first` .. `first + 5` in the order x-, x+, y-, y+, z-, z+.
-struct Box {
-    int first = 0;
-    Eigen::Vector3d lower(const dem::World& world) const;
-    Eigen::Vector3d upper(const dem::World& world) const;
-    /// Mean normal pressure of the bodies on wall i (0..5) [Pa].
-    double pressure(const dem::World& world, int i) const;
-};
-
-/// \throws Error  when the centre of a body is outside the box: which grain, where and when
-void check_inside(const dem::World& world, int body, int grain, const Eigen::Vector3d& lower, const Eigen::Vector3d& upper, const char* phase, const char* help);
-
-/// Touching grains per wall of the box.
-std::array<int, 6> wall_contacts(const dem::World& world, const Box& box);
 /// Servo of one pair of walls: closing speed of each wall [m/s] from the missing pressure [Pa].
 /// \param gap  between the walls [m]; \param wall_contacts  on one of them; \param stiffness  of a contact [N/m]; \param mass  of the sample [kg]
 double servo_speed(double missing, double area, double gap, int wall_contacts, double stiffness, double mass, double limit);
