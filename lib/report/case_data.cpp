@@ -172,12 +172,15 @@ std::vector<CaseData> read_cases(const std::vector<fs::path>& folders)
     for (const CaseData& data : cases) ++count[data.name], ++labels[data.label];
     for (CaseData& data : cases) {
         const fs::path parent = fs::absolute(data.folder / ".").lexically_normal().parent_path().parent_path();
-        if (!data.label.empty()) data.name = labels[data.label] > 1 ? data.label + ", " + data.name : data.label;
+        if (!data.label.empty()) data.name = labels[data.label] > 1 ? data.label + " (" + data.name + ")" : data.label;
         else if (count[data.name] > 1) data.name = (parent.filename() / data.name).string();
     }
-    // gnuplot ends a quoted field of a csv at the first double quote inside it.
+    // gnuplot ends a field of a csv at the first double quote or comma inside it, quoted or not.
     for (CaseData& data : cases)
-        for (std::string* text : {&data.name, &data.label}) std::ranges::replace(*text, '"', '\'');
+        for (std::string* text : {&data.name, &data.label}) {
+            std::ranges::replace(*text, '"', '\'');
+            std::ranges::replace(*text, ',', ';');
+        }
     std::set<std::string> seen;
     for (CaseData& data : cases) {
         const std::string name = data.name;

@@ -111,7 +111,7 @@ struct CaseData {
 CaseData read_case(const std::filesystem::path& folder);
 
 /// Reads several cases and makes their names unique (folder name; with its parent when two agree).
-/// A folder may be given as LABEL=FOLDER: the case is then called so; several with one label are repeats, called "LABEL, folder name".
+/// A folder may be given as LABEL=FOLDER: the case is then called so; several with one label are repeats, called "LABEL (folder name)". Double quotes and commas become ' and ;.
 /// What exists as it stands is a folder, whatever signs it holds.
 std::vector<CaseData> read_cases(const std::vector<std::filesystem::path>& folders);
 

@@ -136,6 +136,12 @@ std::array<double, 2> band_at(const CaseData& data, const std::string& column, d
     return {value - error, value + error};
 }
 
+/// A mean over no volume is written as 0 by the run; it is no speed.
+bool has_meaning(const CaseData& data, const std::string& column, std::size_t step)
+{
+    return column != "velocity_intraparticle" || !data.find("intraparticle_volume") || find_column(data.series, "intraparticle_volume").at(step) > 0;
+}
+
 Figure make_time_figure(const TimeFigure& spec, const std::vector<CaseData>& cases)
 {
     Figure figure;
@@ -166,7 +172,7 @@ Figure make_time_figure(const TimeFigure& spec, const std::vector<CaseData>& cas
         for (std::size_t i = 0; i < data.time.size(); ++i) {
             std::vector<Cell> row{data.name, data.time[i]};
             for (std::size_t c = 0; c < columns.size(); ++c) {
-                const double value = sources[c].at(i);
+                const double value = has_meaning(data, columns[c], i) ? sources[c].at(i) : nan_value;
                 const auto [low, high] = band_at(data, columns[c], value, i);
                 for (const double v : {value, low, high}) row.push_back(number_cell(v));
             }

@@ -67,6 +67,18 @@ TEST(Figures, leave_out_what_a_case_did_not_measure)
     EXPECT_EQ(figures[0].name, "eroded_mass");
 }
 
+TEST(Figures, draw_no_speed_inside_grains_without_voids)
+{
+    const ScratchFolder scratch;
+    write_example_case(scratch.path() / "filled");
+    auto cases = read_cases({scratch.path() / "filled"});
+    cases[0].series["intraparticle_volume"] = {"m3", 1, std::vector<double>(cases[0].time.size(), 0.0)};
+    const auto figures = make_figures(cases);
+    const Figure& speeds = find(figures, "flow_velocity");
+    ASSERT_EQ(speeds.panels[0].curves.size(), 1u);
+    EXPECT_EQ(speeds.panels[0].curves[0].column, "velocity_interparticle");
+}
+
 TEST(MigrationDistance, falls_from_all_but_one_fine_to_none)
 {
     const ScratchFolder scratch;

@@ -37,8 +37,8 @@ TEST(Labels, name_cases_and_their_repeats)
 {
     const ScratchFolder scratch;
     const auto cases = repeats(scratch);
-    EXPECT_EQ(cases[0].name, "with voids, seed1");
-    EXPECT_EQ(cases[2].name, "with voids, seed3");
+    EXPECT_EQ(cases[0].name, "with voids (seed1)");
+    EXPECT_EQ(cases[2].name, "with voids (seed3)");
     EXPECT_EQ(cases[3].name, "other");
     EXPECT_EQ(cases[3].label, "");
     // Alone with its label, a case is called by it; a folder whose name holds the sign is a folder.
