@@ -152,8 +152,8 @@ std::vector<Check> centred_arrays(const StudyOptions& options)
     for (const Reference& reference : centred) {
         std::vector<double> resolutions{7, 10, 14};
         if (options.heavy) resolutions.insert(resolutions.end(), {20, 28});
-        // at c = 0.6 the gaps are a twentieth of a diameter: below two cells across them there is nothing to hold a number against
-        resolve(reference, resolutions, 0.02, reference.solid_fraction > 0.5 ? 40 : 13.5, "periodic Stokeslets, collocation", checks);
+        // at c = 0.6 the gaps are 0.04 to 0.07 of a diameter: less than a cell until 28 cells or so
+        resolve(reference, resolutions, 0.02, reference.solid_fraction > 0.5 ? 28 : 13.5, "periodic Stokeslets, collocation", checks);
     }
     return checks;
 }
