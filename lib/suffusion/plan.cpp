@@ -76,6 +76,20 @@ void lay_out(Plan& plan)
     plan.plate_open_fraction = std::pow(plan.options.hole / plan.pitch, 2);
 }
 
+/// Flow, grains and holes of the filter must repeat themselves after the lengths of the sample.
+void check_period(const Plan& plan)
+{
+    for (int axis = 0; axis < 2; ++axis) {
+        const double length = plan.period[axis], holes = length / plan.pitch;
+        if (length <= 0) continue;
+        if (std::abs(plan.domain.size[axis] - length) > 1e-9 * length)
+            throw UsageError("--cell", "near " + to_text(plan.options.cell) + " m: no number of cells of " + to_text(plan.domain.cell) + " m fills the periodic " + "xyz"[axis] + " of " + to_text(length) + " m",
+                             "give an edge that divides both sides of the sample");
+        if (std::abs(holes - std::round(holes)) > 1e-9 * holes)
+            throw UsageError("--hole", "gives a pitch of " + to_text(plan.pitch) + " m, which does not divide the periodic " + "xyz"[axis] + " of " + to_text(length) + " m", "take another size of holes");
+    }
+}
+
 void predict(Plan& plan, const pack::Sample& sample)
 {
     const double dx = plan.domain.cell, nu = FluidSpec{}.kinematic_viscosity;
@@ -130,9 +144,11 @@ std::string vector_text(const Eigen::Vector3d& v) { return "[" + to_text(v.x()) 
 
 Plan make_plan(const pack::Sample& sample, const PlanOptions& options)
 {
+    pack::refuse_cylinder(sample, "the flow on its rectangular cells");
     Plan plan;
     plan.options = options;
     plan.sample_size = sample.size;
+    plan.period = sample.period;
     const double smallest_coarse = population_of(sample, pack::Role::coarse, 0).smallest;
     if (population_of(sample, pack::Role::fine, 0).count == 0)
         throw Error("sample", "has no fines: nothing can be eroded", "pack a population with role = \"fine\"");
@@ -147,6 +163,7 @@ Plan make_plan(const pack::Sample& sample, const PlanOptions& options)
     if (!(plan.options.cell > 0) || plan.options.cell > width / 8)
         throw UsageError("--cell", "is " + to_text(plan.options.cell) + " m", "give an edge above zero and at most an eighth of the sample's width, " + to_text(width) + " m");
     lay_out(plan);
+    check_period(plan);
     plan.populations = {population_of(sample, pack::Role::coarse, plan.domain.cell), population_of(sample, pack::Role::fine, plan.domain.cell)};
     plan.gravity = 9.81 * Eigen::Vector3d(std::sin(options.angle), 0, -std::cos(options.angle));
     for (double& g : plan.gravity)
@@ -161,8 +178,8 @@ std::string explain(const Plan& plan)
     const auto length = [](double v) { return format_quantity(v, Dimension::length); };
     std::string text = fmt::format("domain    {} x {} x {} cells of {} ({:.2f} million)\n", plan.domain.cells.x(), plan.domain.cells.y(), plan.domain.cells.z(),
                                    length(plan.domain.cell), plan.domain.cells.cast<double>().prod() / 1e6);
-    text += fmt::format("flow      {} downwards, {:.0f} deg from gravity; outlet p = 0; slip sides\n", format_quantity(plan.options.velocity, Dimension::velocity),
-                        plan.options.angle * 180 / M_PI);
+    text += fmt::format("flow      {} downwards, {:.0f} deg from gravity; outlet p = 0; {} sides\n", format_quantity(plan.options.velocity, Dimension::velocity),
+                        plan.options.angle * 180 / M_PI, plan.period.isZero(0) ? "slip" : plan.period.head<2>().minCoeff() > 0 ? "periodic" : "slip and periodic");
     text += fmt::format("filter    square holes {} every {}, {:.0f} % open, {} thick\n", length(plan.options.hole), length(plan.pitch),
                         100 * plan.plate_open_fraction, length(plan.plate_thickness));
     for (const PopulationPlan& p : plan.populations)
@@ -186,7 +203,8 @@ std::string case_text(const Plan& plan, const pack::Sample& sample, const std::s
     text += fmt::format("[domain]\norigin = {}  # m; the sample rests on the filter plate at z = 0\nsize = {}\ncell = {}  # cubic cells, {:.1f} per smallest coarse grain\n\n",
                         vector_text(plan.domain.origin), vector_text(plan.domain.size), to_text(plan.domain.cell), plan.populations[0].smallest / plan.domain.cell);
     text += "[boundary]                # slip | wall | inlet | outlet | periodic; grains leave through outlets only\n";
-    for (const char* face : {"x-", "x+", "y-", "y+"}) text += fmt::format("\"{}\" = {{ type = \"slip\" }}\n", face);
+    for (const std::string_view face : {"x-", "x+", "y-", "y+"})
+        text += fmt::format("\"{}\" = {{ type = \"{}\" }}\n", face, plan.period[face[0] - 'x'] > 0 ? "periodic" : "slip");
     text += fmt::format("\"z+\" = {{ type = \"inlet\", velocity = [0, 0, {}] }}  # m/s\n\"z-\" = {{ type = \"outlet\", pressure = 0 }}  # Pa\n\n",
                         to_text(-plan.options.velocity));
     text += fmt::format("[fluid]\ndensity = {}              # kg/m3\nkinematic_viscosity = {}  # m2/s\ndrag = \"gidaspow\"\n\n", to_text(FluidSpec{}.density),

@@ -34,6 +34,7 @@ struct Plan {
     double plate_thickness = 0, pitch = 0;  ///< [m]; the upper face lies at z = 0, where the sample rests
     double plate_open_fraction = 0;
     Eigen::Vector3d sample_size = Eigen::Vector3d::Zero();  ///< [m]
+    Eigen::Vector3d period = Eigen::Vector3d::Zero();       ///< of the sample; 0 where it has walls [m]
     Eigen::Vector3d gravity = Eigen::Vector3d::Zero();      ///< [m/s2]
     std::vector<PopulationPlan> populations;
     double flow_step = 0, dem_step = 0;    ///< expected [s]

@@ -38,6 +38,7 @@ double largest_sphere_radius(const Case& description)
 void add_sample(Scene& scene, pack::Sample& sample)
 {
     const Case& c = scene.description;
+    pack::refuse_cylinder(sample, "suffuse");
     scene.history = sample.history;
     if (c.overrides_material)
         for (pack::Material& m : sample.materials) m = material_of(m.name, c.materials.at("default"));

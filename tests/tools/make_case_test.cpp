@@ -61,6 +61,58 @@ TEST(MakeCase, writes_a_case_that_reads_back_and_runs)
     EXPECT_NE(results.string_attribute("/", "history").find("make-case"), std::string::npos);
 }
 
+TEST(MakeCase, a_periodic_sample_makes_a_periodic_case_that_runs)
+{
+    const ScratchFolder folder;
+    pack::Sample sample = small_sample(true);
+    sample.size.y() = 0.024;
+    sample.period = {0.024, 0.024, 0};
+    for (pack::Particle& p : sample.particles) p.position.x() = std::fmod(p.position.x() + 0.005, 0.024);  // some reach across the seam
+    pack::write_sample(sample, folder.path() / "sample.h5");
+    const ProgramResult made = run_program("make-case sample.h5 -o case --velocity 0.05m/s --cell 1mm --duration 4ms", folder.path());
+    ASSERT_EQ(made.exit_code, 0) << made.err;
+    EXPECT_NE(made.out.find("periodic sides"), std::string::npos) << made.out;
+    const suffusion::Case c = suffusion::read_case(folder.path() / "case");
+    for (int face = 0; face < 4; ++face) EXPECT_EQ(c.boundary[std::size_t(face)].kind, suffusion::BoundaryKind::periodic) << face;
+    EXPECT_NEAR(c.domain->size.x(), 0.024, 1e-15);
+    EXPECT_NEAR(c.domain->size.y(), 0.024, 1e-15);
+    const ProgramResult run = run_program("suffuse case --quiet", folder.path());
+    ASSERT_EQ(run.exit_code, 0) << run.err;
+    const H5File results = H5File::open(folder.path() / "case/results.h5");
+    EXPECT_NEAR(results.read_doubles("/series/time").back(), 0.004, 1e-15);
+    for (const double error : results.read_doubles("/series/mass_balance_error")) EXPECT_LT(std::abs(error), 1e-6);
+
+    // the same in a domain with slip sides is refused, and so are cells or holes that do not repeat themselves
+    std::string text = read_text_file(folder.path() / "case/case.toml");
+    while (text.find("periodic\" }") != std::string::npos) text.replace(text.find("periodic\" }"), 8, "slip");
+    write_text_file(folder.path() / "case/case.toml", text);
+    const ProgramResult slip = run_program("suffuse case --quiet", folder.path());
+    EXPECT_EQ(slip.exit_code, 1);
+    EXPECT_NE(slip.err.find("repeats itself along x after 0.024 m"), std::string::npos) << slip.err;
+    sample.size.y() = sample.period.y() = 0.0236;
+    pack::write_sample(sample, folder.path() / "odd.h5");
+    EXPECT_EQ(run_program("make-case odd.h5 -o odd --cell 1mm", folder.path()).exit_code, 2);
+}
+
+TEST(MakeCase, a_cylinder_is_refused_by_it_and_by_suffuse)
+{
+    const ScratchFolder folder;
+    pack::Sample sample = small_sample(true);
+    pack::write_sample(sample, folder.path() / "sample.h5");
+    ASSERT_EQ(run_program("make-case sample.h5 -o case --cell 1mm --duration 1ms", folder.path()).exit_code, 0);
+    sample.walls = {{"side", {0.012, 0.012, 0}, Eigen::Vector3d::UnitZ(), 0, 0, 0.02}};
+    pack::write_sample(sample, folder.path() / "case/sample.h5");
+    for (const char* command : {"make-case case/sample.h5 -o other", "suffuse case --quiet"}) {
+        const ProgramResult refused = run_program(command, folder.path());
+        EXPECT_EQ(refused.exit_code, 1) << command;
+        EXPECT_NE(refused.err.find("lies in a cylinder"), std::string::npos) << refused.err;
+        EXPECT_NE(refused.err.find("pack it with [box]"), std::string::npos) << refused.err;
+    }
+    const ProgramResult info = run_program("grain-info case/sample.h5", folder.path());
+    EXPECT_EQ(info.exit_code, 0) << info.err;
+    EXPECT_NE(info.out.find("a cylinder of 40"), std::string::npos) << info.out;
+}
+
 TEST(MakeCase, explain_prints_the_plan_and_writes_nothing)
 {
     const ScratchFolder folder;
