@@ -218,7 +218,8 @@ TEST_F(GrainInfo, refuses_damaged_files_and_those_of_a_newer_version)
         for (const std::string& group : groups) file.make_group(group);
         file.set_format(9);
         file.commit();
-        expect_refusal("newer.h5", "newer.h5: was written by a newer version of the tools (format 9, this one reads up to 2); update the tools");
+        const std::string known = content == "coralsand sample" ? "2" : "1";
+        expect_refusal("newer.h5", "newer.h5: was written by a newer version of the tools (format 9, this one reads up to " + known + "); update the tools");
     };
     newer({"/shapes"}, "coralsand harmonic shapes");
     newer({"/particles"}, "coralsand sample");
