@@ -275,7 +275,8 @@ std::vector<Check> ergun_walls(const StudyOptions& options)
             }));
             for (const auto& [what, target, value] : {std::tuple{"void fraction in the core", bed_void_fraction, bed.void_core}, {"void fraction along the walls", bed_void_fraction, bed.void_wall},
                                                       {"superficial speed in the core over the mean", 1.0, bed.speed_core}, {"superficial speed along the walls over the mean", 1.0, bed.speed_wall}})
-                rows.push_back({what, "1", target, value, shown_only, true, "of the whole bed", double(ratio), rows.back().seconds});
+                if (std::isfinite(value))  // with one cell per diameter no cell centre lies in the layer along the walls
+                    rows.push_back({what, "1", target, value, shown_only, true, "of the whole bed", double(ratio), rows.back().seconds});
         }
     return rows;
 }
