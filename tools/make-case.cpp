@@ -15,7 +15,7 @@ namespace {
 namespace fs = std::filesystem;
 
 struct Options {
-    std::string sample, output, engine = "embedded";
+    std::string sample, output, engine = "embedded", lid = "keep";
     coral::suffusion::PlanOptions plan;
     bool explain = false;
 };
@@ -29,6 +29,7 @@ void declare(coral::cli::Options& options, Options& o)
     options.quantity("--angle", o.plan.angle, Dimension::angle, "Between flow and gravity (gravity is turned)");
     options.quantity("--hole", o.plan.hole, Dimension::length, "Edge of the filter's square holes; 0: 0.4 of the smallest coarse grain");
     options.quantity("--cell", o.plan.cell, Dimension::length, "Edge of the flow cells; 0: a thirtieth of the smallest coarse grain");
+    options.add("--lid", o.lid, "Upper wall of the packing: keep (holds the grains, water passes), or remove (a compressed sample springs up)").one_of({"keep", "remove"});
     options.quantity("--duration", o.plan.duration, Dimension::time, "Length of the run");
     options.add("--engine", o.engine, "Flow solver: embedded or openfoam");
     options.flag("--explain", o.explain, "Print the plan only");
@@ -41,7 +42,7 @@ nlohmann::ordered_json json_plan(const coral::suffusion::Plan& plan)
                                 {"origin", {plan.domain.origin.x(), plan.domain.origin.y(), plan.domain.origin.z()}},
                                 {"size", {plan.domain.size.x(), plan.domain.size.y(), plan.domain.size.z()}},
                                 {"velocity", plan.options.velocity}, {"angle", plan.options.angle}, {"hole", plan.options.hole}, {"pitch", plan.pitch},
-                                {"plate_open_fraction", plan.plate_open_fraction}, {"duration", plan.options.duration},
+                                {"plate_open_fraction", plan.plate_open_fraction}, {"lid", plan.options.lid}, {"duration", plan.options.duration},
                                 {"flow_step", plan.flow_step}, {"dem_step", plan.dem_step}, {"memory", plan.memory}, {"run_time", plan.run_time}};
     for (const auto& p : plan.populations)
         json["populations"].push_back({{"role", p.role}, {"count", p.count}, {"smallest", p.smallest}, {"largest", p.largest},
@@ -66,7 +67,9 @@ void run(const Options& o, const coral::cli::Context& context)
     if (o.output.empty() && !o.explain) throw UsageError("--output", "is missing", "name the folder of the case with -o, or ask for the plan with --explain");
     if (!fs::is_regular_file(o.sample)) throw UsageError(o.sample, "there is no such file", "name a sample that pack-sample wrote");
     const pack::Sample sample = pack::read_sample(o.sample);
-    const suffusion::Plan plan = suffusion::make_plan(sample, o.plan);
+    suffusion::PlanOptions wanted = o.plan;
+    wanted.lid = o.lid == "keep";
+    const suffusion::Plan plan = suffusion::make_plan(sample, wanted);
     std::string human = suffusion::explain(plan);
     if (!o.explain) {
         const fs::path folder = o.output;

@@ -182,6 +182,7 @@ std::string explain(const Plan& plan)
                         plan.options.angle * 180 / M_PI, plan.period.isZero(0) ? "slip" : plan.period.head<2>().minCoeff() > 0 ? "periodic" : "slip and periodic");
     text += fmt::format("filter    square holes {} every {}, {:.0f} % open, {} thick\n", length(plan.options.hole), length(plan.pitch),
                         100 * plan.plate_open_fraction, length(plan.plate_thickness));
+    text += plan.options.lid ? fmt::format("lid       stays at {}: it holds the grains, water passes\n", length(plan.sample_size.z())) : "lid       taken away: a compressed sample springs up\n";
     for (const PopulationPlan& p : plan.populations)
         text += fmt::format("{:<9} {} grains of {} to {}: {}{} ({})\n", p.role, p.count, length(p.smallest), length(p.largest), to_string(p.scheme),
                             p.mixed ? " (most; decided grain by grain)" : "", p.why);
@@ -219,6 +220,9 @@ std::string case_text(const Plan& plan, const pack::Sample& sample, const std::s
     text += "\n[motion]                  # free | fixed, by role\ncoarse = \"free\"\n\n";
     text += fmt::format("[[wall]]                  # the filter\ntype = \"plate\"\nz = 0                     # upper face, m\nhole = {}\npitch = {}\nthickness = {}\n\n",
                         to_text(plan.options.hole), to_text(plan.pitch), to_text(plan.plate_thickness));
+    if (plan.options.lid)
+        text += fmt::format("[[wall]]                  # the lid of the packing: holds the grains, water passes; leave it out and a compressed sample springs up\n"
+                            "type = \"plane\"\npoint = [0, 0, {}]\nnormal = [0, 0, -1]\n\n", to_text(plan.sample_size.z()));
     if (plan.domain.size.y() > plan.sample_size.y() * (1 + 1e-9))
         text += fmt::format("[[wall]]                  # the sample is not a whole number of cells deep\ntype = \"plane\"\npoint = [0, 0, 0]\nnormal = [0, 1, 0]\n\n"
                             "[[wall]]\ntype = \"plane\"\npoint = [0, {}, 0]\nnormal = [0, -1, 0]\n\n", to_text(plan.sample_size.y()));

@@ -16,6 +16,9 @@ struct PlanOptions {
     double hole = 0;        ///< edge of the filter holes [m]; 0: 0.4 of the smallest coarse diameter (6 mm for 15 mm grains)
     double cell = 0;        ///< [m]; 0: a thirtieth of the smallest coarse diameter (0.5 mm for 15 mm grains)
     double duration = 2;    ///< [s]
+    /// Whether the upper wall of the packing stays, as the perforated plate of an oedometer: for grains only, water passes. Without it a
+    /// compressed sample springs up when the run starts.
+    bool lid = true;
 };
 
 /// Grains of one role.

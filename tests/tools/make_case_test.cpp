@@ -1,6 +1,7 @@
 // make-case on a small sample made in memory; the case it writes runs.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -51,6 +52,16 @@ TEST(MakeCase, writes_a_case_that_reads_back_and_runs)
     EXPECT_NEAR(c.plate()->hole, 0.4 * 0.0115, 1e-12);
     EXPECT_DOUBLE_EQ(c.materials.at("default").density, 2650);
     EXPECT_GT(c.domain->size.z(), 0.024);
+    // The lid of the packing stays, for grains only.
+    const auto is_lid = [&](const suffusion::WallSpec& w) { return w.kind == suffusion::WallKind::plane && w.normal.z() == -1; };
+    const auto lid = std::find_if(c.walls.begin(), c.walls.end(), is_lid);
+    ASSERT_NE(lid, c.walls.end());
+    EXPECT_DOUBLE_EQ(lid->point.z(), small_sample(true).size.z());
+    EXPECT_LT(lid->point.z(), c.domain->origin.z() + c.domain->size.z());
+    const ProgramResult open = run_program("make-case sample.h5 -o open --lid remove --quiet", folder.path());
+    ASSERT_EQ(open.exit_code, 0) << open.err;
+    const suffusion::Case without = suffusion::read_case(folder.path() / "open");
+    EXPECT_EQ(std::count_if(without.walls.begin(), without.walls.end(), is_lid), 0);
     // The faces of the plate lie off the faces of the cells.
     const double offset = -c.domain->origin.z() / c.domain->cell;
     EXPECT_NEAR(offset - std::floor(offset), 0.75, 1e-9);
