@@ -4,6 +4,7 @@
 /// SI units; all vectors in the world frame unless said otherwise.
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -54,6 +55,23 @@ struct Contact {
     double overlap = 0;  ///< greatest depth [m]
     int points = 1;      ///< touching nodes
 };
+
+/// How a sphere feels a grid.
+enum class SphereScheme {
+    automatic,  ///< `walls` for a pair that has come near a second wall, until it parts; `nearest` for the others
+    nearest,  ///< one query of the distance at its centre: the nearest wall pushes. Cheapest; where two walls are within its radius (throats, grooves,
+              ///< voids) the lattice makes room narrower by up to 0.7 spacings, a wedge is half as stiff, and a sphere that is pressed into a
+              ///< groove never rests: the walls push in turn, and pump energy into it
+    walls,    ///< pressed on the triangulated surface (dem/detail/facets.h): every wall pushes, throats are true to 0.1 spacing; a few times the cost
+};
+
+/// Words of specifications and cases, in the order of SphereScheme.
+inline const std::vector<std::string> sphere_scheme_words{"automatic", "nearest", "walls"};
+/// \pre one of the words
+inline SphereScheme sphere_scheme_of(const std::string& word)
+{
+    return SphereScheme(std::find(sphere_scheme_words.begin(), sphere_scheme_words.end(), word) - sphere_scheme_words.begin());
+}
 
 /// One friction spring: what the contact law remembers between steps.
 struct ContactSpring {

@@ -32,6 +32,16 @@ int slot_of(Slots& slots, const Vec3& normal)
     return k;
 }
 
+/// Whether a touching sphere has another wall than in the last step: its normal has turned by more than a surface under it can.
+bool changes_wall(const Slots& slots, const Vec3& normal)
+{
+    constexpr double least = 0.995;  // cosine of 6 degrees
+    if (slots.used == 0) return false;
+    for (int k = 0; k < Slots::count; ++k)
+        if ((slots.used >> k & 1) && slots.normal[k].dot(normal) < least) return true;
+    return false;
+}
+
 /// What the walls of a grid press on a sphere, gathered by the place on the sphere: each has a dashpot and a friction spring.
 /// Only these are told apart by place; the elastic force is the plain sum over the surface.
 struct Places {
@@ -80,6 +90,24 @@ struct Places {
 
 }  // namespace
 
+/// Whether a second wall is about to touch a sphere that its nearest wall touches. Away from one wall the distance grows with the way; it grows
+/// less where another one is at an angle a: found from a gap of s (1 - cos a) on, s the way.
+bool World::Impl::is_cornered(std::size_t i, std::size_t j) const
+{
+    constexpr double way = 0.45, least = 0.01, near = 0.02;  // of the radius
+    const Shape& master = *shapes[std::size_t(shape[j])];
+    if (master.kind() != ShapeKind::grid) return false;
+    const sdf::DistanceGrid& grid = master.distance_grid();
+    const double r = radius[i] / scale[j];
+    const Vec3 local = q[j].conjugate() * periodic(x[i] - x[j]) / scale[j];
+    Vec3 gradient;
+    const double distance = grid.sample_with_gradient(local, gradient), slope = gradient.norm();
+    if (distance > (1.0 + near) * r) return false;
+    if (slope < 0.5) return true;  // amid walls
+    const Vec3 further = local + (way * r / slope) * gradient;
+    return grid.inside_box(further) && grid.sample(further) < distance + (way - least) * r;
+}
+
 /// The sphere of pair k pressed on the surface of its grid. \returns whether it touches
 bool World::Impl::press_on_walls(std::size_t k, double dt, GeneralForce& out, LoopSums& s, std::vector<Crossing>& crossing)
 {
@@ -87,13 +115,23 @@ bool World::Impl::press_on_walls(std::size_t k, double dt, GeneralForce& out, Lo
     const std::size_t i = std::size_t(l.sphere[k]), j = std::size_t(l.grid[k]);
     const Vec3 offset = periodic(x[i] - x[j]);
     const Vec3 local = q[j].conjugate() * offset / scale[j];
-    // Triangles that were farther away when the list was made than the sphere has come since are not looked at.
-    const double reach = radius[i] / scale[j] + (local - l.listed[k]).norm();
-    Index end = l.facet_start[k];
-    while (end < l.facet_start[k + 1] && double(l.facet[std::size_t(end)].clearance) < reach) ++end;
-    if (l.touch[k] == 0 && end == l.facet_start[k]) return false;
-
-    const detail::Facets& surface = *facets[std::size_t(shape[j])];
+    // Triangles that were farther away when they were gathered than the sphere has come since are not looked at.
+    constexpr double stale = 0.01;  // of the radius: in a close-fitting void every bit of way brings up many triangles
+    const double r = radius[i] / scale[j];
+    double moved = (local - l.listed[k]).norm();
+    if (r + (local - l.cut[k]).norm() > l.within[k]) {
+        make_pocket_here(k);
+        moved = 0.0;
+    } else if (moved > stale * r) {
+        l.listed[k] = local;
+        gather_pocket(k);
+        moved = 0.0;
+    }
+    const double reach = r + moved;
+    const Pocket& pocket = l.pocket[k];
+    std::size_t end = 0;
+    while (end < pocket.near.size() && double(pocket.near[end].clearance) < reach) ++end;
+    if (l.touch[k] == 0 && end == 0) return false;
     const PairLaw& pair = law(material[i], material[j]);
     const double stiffness = pair.kn * scale[j] * scale[j] / (2.0 * std::numbers::pi * radius[i]);
     Slots& slots = l.slots[k];
@@ -101,8 +139,8 @@ bool World::Impl::press_on_walls(std::size_t k, double dt, GeneralForce& out, Lo
     PressMemory now;
     Vec3 push = Vec3::Zero();
     detail::Press press;
-    for (Index f = l.facet_start[k]; f < end; ++f) {
-        if (!surface.press(l.facet[std::size_t(f)].triangle, local, radius[i] / scale[j], press)) continue;
+    for (std::size_t f = 0; f < end; ++f) {
+        if (!pocket.surface->press(pocket.near[f].triangle, local, radius[i] / scale[j], press)) continue;
         places.add(press);
         push += stiffness * press.force;
         now.stored += stiffness * scale[j] * press.energy;
@@ -190,7 +228,9 @@ bool World::Impl::press_on_nearest(std::size_t k, double dt, GeneralForce& out, 
         const Vec3 arm_j = offset - arm_i * n;  // contact point, from the grid's centre
         const Vec3 velocity = v[i] - v[j] - arm_i * w[i].cross(n) - w[j].cross(arm_j);
         const Vec3 slide = velocity - n.dot(velocity) * n;
+        const bool turned = changes_wall(slots, local_normal);
         Vec3& spring = slots.spring[slot_of(slots, local_normal)];
+        if (turned && options.sphere_scheme == SphereScheme::automatic && field.grid) make_pocket_here(k);
         const detail::Friction friction = detail::rub({pair, n, slide, slide, 0.5 * (w[i] + w[j]).dot(n), root_mass}, fn, dt, spring);
         out.points = 1;
         out.overlap = overlap;
@@ -250,7 +290,8 @@ void World::Impl::close_books(std::size_t k, const PressMemory& now, bool clampe
 void World::Impl::sphere_grid_loop(double dt)
 {
     SphereGridList& l = sphere_grids;
-    const bool all_walls = options.sphere_scheme == SphereScheme::walls;
+    const bool automatic = options.sphere_scheme == SphereScheme::automatic, nearest = options.sphere_scheme == SphereScheme::nearest;
+    constexpr std::size_t looks = 16;  // steps between two looks for a second wall: a sphere goes some micrometres in them
     const std::size_t base = out_count[0].size() + out_count[1].size();
     parallel_blocks(l.sphere.size(), grid_grain, [&](std::size_t first, std::size_t last) {
         const std::size_t block = first / grid_grain;
@@ -278,8 +319,10 @@ void World::Impl::sphere_grid_loop(double dt)
             if (n + ahead < count) fetch(n + ahead);
             const std::size_t k = std::size_t(l.near[n]);
             ++s.node_queries;
-            const bool on_grid = shapes[std::size_t(shape[std::size_t(l.grid[k])])]->kind() == ShapeKind::grid;
-            if (all_walls && on_grid ? press_on_walls(k, dt, *out, s, crossing) : press_on_nearest(k, dt, *out, s, crossing)) ++out;
+            if (automatic && !(l.within[k] > 0.0) && (dt <= 0.0 || (k + std::size_t(counters.steps)) % looks == 0) &&
+                is_cornered(std::size_t(l.sphere[k]), std::size_t(l.grid[k])))
+                make_pocket_here(k);
+            if (!nearest && l.within[k] > 0.0 ? press_on_walls(k, dt, *out, s, crossing) : press_on_nearest(k, dt, *out, s, crossing)) ++out;
         }
         s.tests = std::int64_t(last - first);
         s.touching = out - begin;

@@ -14,6 +14,24 @@ namespace {
 
 constexpr int cells_per_block = 4;
 
+sdf::DistanceGrid cut_out(const sdf::DistanceGrid& grid, const Eigen::Vector3d& point, double distance)
+{
+    const auto cell = [&](const Eigen::Array3d& p) { return Eigen::Array3i(((p - grid.origin.array()) / grid.spacing).floor().cast<int>()); };
+    const Eigen::Array3i last = grid.size.array() - 2;
+    const Eigen::Vector3i low = cell(point.array() - distance).max(0).min(last), high = cell(point.array() + distance).max(0).min(last);
+    sdf::DistanceGrid part;
+    part.size = high - low + Eigen::Vector3i::Constant(2);
+    part.origin = grid.node(low.x(), low.y(), low.z());
+    part.spacing = grid.spacing;
+    part.distance.reserve(part.node_count());
+    for (int k = 0; k < part.size.z(); ++k)
+        for (int j = 0; j < part.size.y(); ++j) {
+            const auto row = grid.distance.begin() + std::ptrdiff_t(grid.index(low.x(), low.y() + j, low.z() + k));
+            part.distance.insert(part.distance.end(), row, row + part.size.x());
+        }
+    return part;
+}
+
 /// Integrals over the part of a triangle that lies in the disc of squared radius a2 about the origin of its plane, gathered edge by edge
 /// (Green): area, polar moment, and first moment. Angles of the arcs are multiplied up as complex numbers, so that one arc tangent serves.
 struct DiscPart {
@@ -107,6 +125,8 @@ Facets::Facets(const sdf::DistanceGrid& grid) : origin_(grid.origin), edge_(cell
         balls_[to] = {centre.x(), centre.y(), centre.z(), radius + 1e-4f * float(grid.spacing)};
     }
 }
+
+Facets::Facets(const sdf::DistanceGrid& grid, const Eigen::Vector3d& point, double distance) : Facets(cut_out(grid, point, distance)) {}
 
 std::size_t Facets::memory() const
 {

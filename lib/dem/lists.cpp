@@ -90,7 +90,6 @@ void make_sphere_grid_list(World::Impl& world, const std::vector<BroadPair>& pai
     }
     std::sort(mixed.begin(), mixed.end(), [](const BroadPair& s, const BroadPair& t) { return key_of(s.a, s.b) < key_of(t.a, t.b); });
     const bool all_walls = world.options.sphere_scheme == SphereScheme::walls;
-    if (all_walls) l.facet_start.push_back(0);
     std::size_t k = 0;
     for (const BroadPair& pair : mixed) {
         const std::size_t i = std::size_t(pair.a), j = std::size_t(pair.b);
@@ -113,14 +112,26 @@ void make_sphere_grid_list(World::Impl& world, const std::vector<BroadPair>& pai
         const bool same = k < old.sphere.size() && key_of(old.sphere[k], old.grid[k]) == key;
         l.touch.push_back(same ? old.touch[k] : std::uint8_t{0});
         l.slots.push_back(same ? old.slots[k] : Slots{});
-        // A meshed surface lies within a spacing of where the distances say.
-        const double room = distance - world.radius[i] - (all_walls && field.grid ? scale * field.grid->spacing : 0.0);
-        l.clearance.push_back(std::nextafter(float(room), -1.0F));
         l.press.push_back(same ? old.press[k] : PressMemory{});
-        if (!all_walls) continue;
+        const bool had = same && !old.within.empty() && old.within[k] > 0.0;
+        const bool walls = field.grid && (all_walls || (had && (old.touch[k] != 0 || world.is_cornered(i, j))));
+        // A meshed surface lies within a spacing of where the distances say.
+        const double room = distance - world.radius[i] - (walls ? scale * field.grid->spacing : 0.0);
+        l.clearance.push_back(std::nextafter(float(room), -1.0F));
+        if (world.options.sphere_scheme == SphereScheme::nearest) continue;
+        l.cut.push_back(local / scale);
         l.listed.push_back(local / scale);
-        if (shape.kind() == ShapeKind::grid) world.facets_of(world.shape[j]).gather(local / scale, within / scale, l.facet);
-        l.facet_start.push_back(Index(l.facet.size()));
+        l.within.push_back(walls ? within / scale : 0.0);
+        l.pocket.emplace_back();
+        if (!walls) continue;
+        constexpr double kept = 0.3;  // of the skin: a sphere that has hardly moved keeps its triangles
+        if (had && (local / scale - old.cut[k]).norm() < kept * skin / scale && old.within[k] >= within / scale * (1.0 - 1e-12)) {
+            l.cut.back() = old.cut[k];
+            l.listed.back() = old.listed[k];
+            l.pocket.back() = std::move(old.pocket[k]);
+        } else {
+            world.make_pocket(l.pocket.size() - 1);
+        }
     }
     l.near.resize(l.sphere.size());
     l.out.resize(l.sphere.size());
@@ -128,12 +139,42 @@ void make_sphere_grid_list(World::Impl& world, const std::vector<BroadPair>& pai
 
 }  // namespace
 
-const detail::Facets& World::Impl::facets_of(Index shape_id)
+std::shared_ptr<const detail::Facets> World::Impl::facets_of(Index shape_id)
 {
     facets.resize(shapes.size());
     std::shared_ptr<const detail::Facets>& made = facets[std::size_t(shape_id)];
     if (!made) made = std::make_shared<const detail::Facets>(shapes[std::size_t(shape_id)]->distance_grid());
-    return *made;
+    return made;
+}
+
+/// The surface around the place where it is cut out. One pair in a hundred needs them: their own lattice cells take less memory than
+/// the surfaces of all shapes.
+void World::Impl::make_pocket(std::size_t k)
+{
+    SphereGridList& l = sphere_grids;
+    const Index shape_id = shape[std::size_t(l.grid[k])];
+    Pocket& pocket = l.pocket[k];
+    if (options.sphere_scheme == SphereScheme::walls) pocket.surface = facets_of(shape_id);
+    else pocket.surface = std::make_shared<const detail::Facets>(shapes[std::size_t(shape_id)]->distance_grid(), l.cut[k], l.within[k]);
+    gather_pocket(k);
+}
+
+/// The triangles of the pocket by how near they are to where the sphere is listed.
+void World::Impl::gather_pocket(std::size_t k)
+{
+    SphereGridList& l = sphere_grids;
+    l.pocket[k].near.clear();
+    l.pocket[k].surface->gather(l.listed[k], l.within[k] - (l.listed[k] - l.cut[k]).norm(), l.pocket[k].near);
+}
+
+void World::Impl::make_pocket_here(std::size_t k)
+{
+    SphereGridList& l = sphere_grids;
+    const std::size_t i = std::size_t(l.sphere[k]), j = std::size_t(l.grid[k]);
+    if (!(l.within[k] > 0.0)) l.clearance[k] -= float(scale[j] * shapes[std::size_t(shape[j])]->distance_grid().spacing);
+    l.cut[k] = l.listed[k] = q[j].conjugate() * periodic(x[i] - x[j]) / scale[j];
+    l.within[k] = (radius[i] + skin) / scale[j];
+    make_pocket(k);
 }
 
 void World::Impl::make_lists()

@@ -77,7 +77,7 @@ void visit_state(World::Impl& m, Archive& io)
     SphereWallList& w = m.sphere_walls;
     io(w.body), io(w.wall), io(w.feature), io(w.touch), io(w.memory), io(w.out);
     SphereGridList& g = m.sphere_grids;
-    io(g.sphere), io(g.grid), io(g.touch), io(g.slots), io(g.clearance), io(g.press), io(g.listed), io(g.facet_start), io(g.facet), io(g.out);
+    io(g.sphere), io(g.grid), io(g.touch), io(g.slots), io(g.clearance), io(g.press), io(g.cut), io(g.within), io(g.listed), io(g.out);
     NodeList& n = m.nodes;
     io(n.slave), io(n.master), io(n.start), io(n.share), io(n.node), io(n.clearance), io(n.least), io(n.way_listed), io(n.owed), io(n.first), io(n.count), io(n.out);
     io(n.skin), io(n.ways), io(n.wall_ways);
@@ -119,9 +119,9 @@ void World::restore(std::span<const std::uint8_t> state)
     visit_state(m, in);
     for (std::size_t i = 0; i < m.x.size(); ++i) m.update_mass(i);
     m.crossings.resize(std::max(m.crossings.size(), m.block_sums.size()));
-    if (m.options.sphere_scheme == SphereScheme::walls)
-        for (const Index grid : m.sphere_grids.grid)
-            if (m.shapes[std::size_t(m.shape[std::size_t(grid)])]->kind() == ShapeKind::grid) m.facets_of(m.shape[std::size_t(grid)]);
+    m.sphere_grids.pocket.assign(m.sphere_grids.within.size(), {});
+    for (std::size_t k = 0; k < m.sphere_grids.within.size(); ++k)
+        if (m.sphere_grids.within[k] > 0.0) m.make_pocket(k);
     m.spheres.make_room();
     m.sphere_walls.make_room();
     m.sphere_grids.near.resize(m.sphere_grids.sphere.size());

@@ -22,13 +22,6 @@
 
 namespace coral::dem {
 
-/// How a sphere feels a grid.
-enum class SphereScheme {
-    nearest,  ///< one query of the distance at its centre: the nearest wall pushes. Cheapest; where two walls are within its radius (throats, grooves,
-              ///< voids) the lattice makes room narrower by up to 0.7 spacings, and a wedge is half as stiff
-    walls,    ///< pressed on the triangulated surface (dem/detail/facets.h): every wall pushes, throats are true to 0.1 spacing; a few times the cost
-};
-
 struct WorldOptions {
     Eigen::Vector3d gravity{0, 0, -9.81};  ///< [m/s2]
     /// Periodic lengths along x, y, z [m]; 0 is not periodic. Positions are kept unwrapped; differences take the nearest image.
@@ -38,7 +31,7 @@ struct WorldOptions {
     double overlap_cap = 0.5;     ///< sphere forces grow no more beyond this overlap / smaller radius [-]
     bool two_way_nodes = false;   ///< grid pairs: nodes of both bodies, half each (energy error 1.7 times lower, cost 2 times)
     bool force_step = false;      ///< allows omega dt > 1.5
-    SphereScheme sphere_scheme = SphereScheme::nearest;
+    SphereScheme sphere_scheme = SphereScheme::automatic;
 };
 
 class World {

@@ -59,7 +59,7 @@ Sample pack(const Spec& spec, std::uint64_t seed, detail::Keeper& keeper)
     Sample& sample = grains.sample;
     sample.walls = detail::walls_around(spec, sample.size.z());  // the lid touches the highest bounding sphere
     dem::WorldOptions options = world_options(sample);
-    if (spec.all_walls) options.sphere_scheme = dem::SphereScheme::walls;
+    options.sphere_scheme = spec.sphere_scheme;
     options.force_step = spec.force_step;
     dem::World world(options);
     const SampleIds ids = add_sample(world, sample);

@@ -114,7 +114,7 @@ dem::World soft_world(const Sample& sample, const Spec& spec, const std::vector<
     dem::WorldOptions options;
     options.gravity = spec.gravity;
     options.period = spec.period;
-    if (spec.all_walls) options.sphere_scheme = dem::SphereScheme::walls;
+    options.sphere_scheme = spec.sphere_scheme;
     options.step_fraction = 0.5;
     dem::World world(options);
     for (const auto& shape : shapes) world.add_shape(shape);

@@ -370,8 +370,7 @@ Spec read_spec(const std::filesystem::path& file, const std::filesystem::path& g
         spec.dem_step = time.quantity("dem_step", Dimension::time, 0.0);
         if (time.has("dem_step")) require_positive(time, "dem_step", spec.dem_step);
     }
-    static const std::vector<std::string> schemes{"nearest", "walls"};
-    spec.all_walls = root.table("contact").choice("spheres", schemes, "nearest") == "walls";
+    spec.sphere_scheme = dem::sphere_scheme_of(root.table("contact").choice("spheres", dem::sphere_scheme_words, "automatic"));
     spec.force_step = time.boolean("force_step", false);
     spec.step_location = time.location("dem_step");
     check_together(tables, root, spec);

@@ -100,7 +100,7 @@ struct Spec {
     std::string box_location, box_key;  ///< "file:line:column" and name of the size of the box, for errors found later
     double dem_step = 0;     ///< [s]; 0: automatic
     bool force_step = false;   ///< takes a step above the critical one, too
-    bool all_walls = false;    ///< spheres press on every wall of a level set that they reach: dem::SphereScheme::walls
+    dem::SphereScheme sphere_scheme = dem::SphereScheme::automatic;
     std::string step_location;  ///< "file:line:column" of the step
     Eigen::Vector3d gravity = {0, 0, -9.81};
     std::vector<std::string> warnings;  ///< odd but allowed, for the user to read

@@ -258,8 +258,7 @@ WallSpec read_wall(const ConfigTable& table, const Case& result)
 
 void read_populations(const ConfigTable& root, Case& result)
 {
-    static const Strings sphere_schemes{"nearest", "walls"};
-    result.all_walls = root.table("contact").choice("spheres", sphere_schemes, "nearest") == "walls";
+    result.sphere_scheme = dem::sphere_scheme_of(root.table("contact").choice("spheres", dem::sphere_scheme_words, "automatic"));
     const ConfigTable schemes = root.table("scheme"), motions = root.table("motion");
     for (const string& role : schemes.keys()) result.scheme_of_role[role] = read_choice<Scheme>(schemes, role.c_str(), scheme_names, "auto");
     for (const string& role : motions.keys()) result.motion_of_role[role] = read_choice<BodyMotion>(motions, role.c_str(), motion_names, "free");

@@ -12,6 +12,8 @@
 #include <string>
 #include <vector>
 
+#include "dem/body.h"
+
 namespace coral::suffusion {
 
 enum class BoundaryKind { slip, wall, inlet, outlet, periodic };
@@ -113,7 +115,7 @@ struct Case {
     std::array<FaceCondition, 6> boundary{};
     std::optional<FluidSpec> fluid;
     Eigen::Vector3d gravity{0, 0, -9.81};  ///< [m/s2]
-    bool all_walls = false;                ///< [contact] spheres = "walls": dem::SphereScheme::walls
+    dem::SphereScheme sphere_scheme = dem::SphereScheme::automatic;  ///< [contact] spheres
     /// Whether the file has [material.default]; otherwise grains of a sample keep the sample's materials.
     bool overrides_material = false;
     std::map<std::string, MaterialSpec> materials;

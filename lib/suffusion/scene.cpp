@@ -143,7 +143,7 @@ dem::World make_world(const Case& c)
 {
     dem::WorldOptions options;
     options.gravity = c.gravity;
-    if (c.all_walls) options.sphere_scheme = dem::SphereScheme::walls;
+    options.sphere_scheme = c.sphere_scheme;
     for (int axis = 0; axis < 3; ++axis)
         if (c.domain && c.boundary[2 * axis].kind == BoundaryKind::periodic) options.period[axis] = c.domain->size[axis];
     return dem::World(options);

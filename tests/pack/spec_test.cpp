@@ -39,10 +39,11 @@ void expect_message(const std::string& spec, const std::string& part)
 
 }  // namespace
 
-TEST(PackingSpec, spheres_press_on_the_nearest_wall_or_on_all)
+TEST(PackingSpec, spheres_press_on_the_nearest_wall_or_on_all_or_as_the_place_asks)
 {
-    EXPECT_FALSE(spec_of(box + coarse + fine).all_walls);
-    EXPECT_TRUE(spec_of(box + coarse + fine + "[contact]\nspheres = \"walls\"\n").all_walls);
+    EXPECT_EQ(spec_of(box + coarse + fine).sphere_scheme, coral::dem::SphereScheme::automatic);
+    EXPECT_EQ(spec_of(box + coarse + fine + "[contact]\nspheres = \"walls\"\n").sphere_scheme, coral::dem::SphereScheme::walls);
+    EXPECT_EQ(spec_of(box + coarse + fine + "[contact]\nspheres = \"nearest\"\n").sphere_scheme, coral::dem::SphereScheme::nearest);
     expect_message(box + coarse + fine + "[contact]\nspheres = \"wals\"\n", "walls");
     expect_message(box + coarse + fine + "[contact]\nsphere = \"walls\"\n", "spheres");
 }

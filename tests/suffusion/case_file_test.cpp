@@ -103,7 +103,7 @@ TEST(CaseFile, reads_every_key_of_the_contract_in_si)
     EXPECT_DOUBLE_EQ(c.output.frames, 0.05);
     EXPECT_FALSE(c.output.track_all);
     EXPECT_EQ(c.flow_axis(), 2);
-    EXPECT_TRUE(c.all_walls);
+    EXPECT_EQ(c.sphere_scheme, dem::SphereScheme::walls);
 }
 
 TEST(CaseFile, leaves_out_what_the_file_does_not_name)
@@ -111,7 +111,8 @@ TEST(CaseFile, leaves_out_what_the_file_does_not_name)
     const Scratch scratch;
     scratch.write("drop.toml", "[[body]]\nshape = { type = \"sphere\", diameter = 0.01 }\nposition = [0, 0, 1]\n[time]\nduration = 1\n");
     const Case c = read_case(scratch.path() / "drop.toml");
-    EXPECT_FALSE(c.fluid || c.domain || c.sample || c.all_walls);
+    EXPECT_FALSE(c.fluid || c.domain || c.sample);
+    EXPECT_EQ(c.sphere_scheme, dem::SphereScheme::automatic);
     EXPECT_EQ(c.time.dem_step, 0);
     EXPECT_EQ(c.output.frames, 0);
     EXPECT_TRUE(c.output.track_all);

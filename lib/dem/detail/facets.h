@@ -24,6 +24,8 @@ struct Press {
 class Facets {
 public:
     explicit Facets(const sdf::DistanceGrid& grid);
+    /// Of the cells within `distance` of a point (in each axis) alone: there the triangles are those of the whole surface.
+    Facets(const sdf::DistanceGrid& grid, const Eigen::Vector3d& point, double distance);
     std::size_t size() const { return balls_.size(); }
     std::size_t memory() const;  ///< [bytes]
 

@@ -154,16 +154,22 @@ struct PressMemory {
     double owed = 0.0;                 ///< error of the work that waits for correction [J]
     detail::CellMemory cell;
 };
+/// The part of a surface that a sphere may touch.
+struct Pocket {
+    std::shared_ptr<const detail::Facets> surface;
+    std::vector<detail::Facets::Near> near;  ///< nearest first
+};
 struct SphereGridList {
     std::vector<Index> sphere, grid;
     std::vector<std::uint8_t> touch;
     std::vector<Slots> slots;
     std::vector<float> clearance;  ///< distance - radius when the list was made, rounded down [m]
     std::vector<PressMemory> press;
-    // Where all walls push:
-    std::vector<Vec3> listed;                 ///< centre of the sphere when the list was made, frame and scale of the shape [m]
-    std::vector<Index> facet_start;           ///< has one more entry
-    std::vector<detail::Facets::Near> facet;  ///< triangles within the skin, nearest first
+    // Where all walls push; empty with SphereScheme::nearest. Frame and scale of the shape.
+    std::vector<Vec3> cut;       ///< centre of the sphere when its part of the surface was cut out [m]
+    std::vector<double> within;  ///< of that place, so far it goes [m]; 0: the nearest wall alone pushes
+    std::vector<Vec3> listed;    ///< centre of the sphere when the triangles near it were last gathered [m]
+    std::vector<Pocket> pocket;
     std::vector<Index> near;  ///< for the loop: entries that may touch, block by block
     std::vector<GeneralForce> out;
 };
@@ -314,7 +320,7 @@ struct World::Impl {
     // lists.cpp
     void make_lists();
     void make_blocks();
-    const detail::Facets& facets_of(Index shape_id);
+    std::shared_ptr<const detail::Facets> facets_of(Index shape_id);
     void drop_contacts(Index body);
     bool lists_expired();
 
@@ -341,6 +347,10 @@ struct World::Impl {
     void sphere_wall_loop(double dt);
     void sphere_grid_loop(double dt);
     bool press_on_walls(std::size_t k, double dt, GeneralForce& out, LoopSums& s, std::vector<Crossing>& crossing);
+    bool is_cornered(std::size_t sphere, std::size_t grid) const;
+    void make_pocket(std::size_t k);
+    void gather_pocket(std::size_t k);
+    void make_pocket_here(std::size_t k);
     bool press_on_nearest(std::size_t k, double dt, GeneralForce& out, LoopSums& s, std::vector<Crossing>& crossing);
     void close_books(std::size_t k, const PressMemory& now, bool clamped, double dt, GeneralForce& out, LoopSums& s, std::vector<Crossing>& crossing);
     void node_loop(double dt);
