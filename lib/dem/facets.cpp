@@ -178,6 +178,16 @@ bool Facets::press(std::int32_t triangle, const Eigen::Vector3d& centre, double 
     const double px = at[0] - cx, py = at[1] - cy, pz = at[2] - cz;
     const double twice2 = nx * nx + ny * ny + nz * nz, lift = nx * px + ny * py + nz * pz;
     if (lift * lift >= radius * radius * twice2) return false;
+    const double qx = px + ux, qy = py + uy, qz = pz + uz, sx = px + vx, sy = py + vy, sz = pz + vz, r2 = radius * radius;
+    const double pp = px * px + py * py + pz * pz, qq = qx * qx + qy * qy + qz * qz, ss = sx * sx + sy * sy + sz * sz;
+    if (std::max({pp, qq, ss}) <= r2) {
+        // All of the triangle: int x dA = A sum v/3, int |x|^2 dA = A (sum |v|^2 + sum v.v')/6 over its corners.
+        const double area = 0.5 * std::sqrt(twice2), share = -area / (3.0 * radius);
+        const double mixed = px * qx + py * qy + pz * qz + qx * sx + qy * sy + qz * sz + sx * px + sy * py + sz * pz;
+        press.force = {share * (px + qx + sx), share * (py + qy + sy), share * (pz + qz + sz)};
+        press.energy = 0.5 * area / radius * (r2 - (pp + qq + ss + mixed) / 6.0);
+        return area > 0.0 && press.energy > 0.0;
+    }
     const double scale = 1.0 / std::sqrt(twice2), height = lift * scale;
     DiscPart part{radius * radius - height * height};
     const double disc = std::sqrt(part.a2) + double(ball.radius);
