@@ -46,7 +46,7 @@ const std::vector<TimeFigure>& time_figures()
          {{"Now", "fines [count]", 1, false, {{"moving_count", "moving"}, {"clogged_count", "clogged"}}},
           {"Since the start", "events [count]", 1, false, {{"clogging_events", "clogged"}, {"unclogging_events", "went on"}}}}},
         {"trapped_fines", "Trapped fines", "Fines whose centre lies in a void inside a grain, those of them that are wholly inside (the others sit in its mouth), and those that came in during "
-         "the run [Fig. 12]. Unless [contact] spheres = \"walls\", throats of level sets are tighter for spheres by about half a lattice spacing, which overstates trapping.",
+         "the run [Fig. 12]. With [contact] spheres = \"nearest\", throats of level sets are tighter for spheres by about half a lattice spacing, which overstates trapping.",
          {{"", "trapped fines [count]", 1, false, {{"trapped_count", "all"}, {"trapped_enclosed", "wholly inside"}, {"trapped_entered", "came in"}}}}},
         {"flow_velocity", "Flow between and inside grains",
          "Mean speed of the water between the grains, and in their voids that are linked to the outside, a cell or more below the surface [Fig. 17].",
