@@ -147,7 +147,7 @@ std::shared_ptr<const detail::Facets> World::Impl::facets_of(Index shape_id)
     return made;
 }
 
-/// The surface around the place where it is cut out. One pair in a hundred needs them: their own lattice cells take less memory than
+/// The surface around the place where it is cut out. Few pairs need them: their own part of the lattice takes less memory than
 /// the surfaces of all shapes.
 void World::Impl::make_pocket(std::size_t k)
 {

@@ -6,39 +6,13 @@
 #include <string>
 
 #include "core/error.h"
-#include "fluid/immersed.h"
+#include "fluid/scenes.h"
 
 using namespace coral::fluid;
+using namespace coral::fluid::test;
 using Eigen::Vector3d;
 
 namespace {
-
-constexpr double pi = std::numbers::pi;
-
-GridSpec cube(int n, double cell, BoundaryKind kind)
-{
-    GridSpec grid;
-    grid.cells.setConstant(n);
-    grid.cell = cell;
-    for (Boundary& side : grid.boundary) side.kind = kind;
-    return grid;
-}
-
-RigidMotion at(const Vector3d& position, const Vector3d& velocity = Vector3d::Zero())
-{
-    RigidMotion motion;
-    motion.position = position;
-    motion.velocity = velocity;
-    return motion;
-}
-
-void coupled_step(Flow& flow, ImmersedBodies& bodies, std::span<const RigidMotion> motions, double dt)
-{
-    flow.predict(dt);
-    bodies.measure(flow, dt, motions);
-    bodies.apply(flow, motions);
-    flow.project(dt);
-}
 
 /// Duct along z, fed from above.
 GridSpec duct(double speed)

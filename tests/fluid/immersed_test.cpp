@@ -1,4 +1,4 @@
-#include "fluid/immersed.h"
+#include "fluid/scenes.h"
 
 #include <gtest/gtest.h>
 
@@ -9,36 +9,10 @@
 #include "core/parallel.h"
 
 using namespace coral::fluid;
+using namespace coral::fluid::test;
 using Eigen::Vector3d;
 
 namespace {
-
-constexpr double pi = std::numbers::pi;
-
-GridSpec cube(int n, double cell, BoundaryKind kind)
-{
-    GridSpec grid;
-    grid.cells.setConstant(n);
-    grid.cell = cell;
-    for (Boundary& side : grid.boundary) side.kind = kind;
-    return grid;
-}
-
-RigidMotion at(const Vector3d& position)
-{
-    RigidMotion motion;
-    motion.position = position;
-    return motion;
-}
-
-/// One step of a flow with bodies that keep their motions.
-void coupled_step(Flow& flow, ImmersedBodies& bodies, std::span<const RigidMotion> motions, double dt)
-{
-    flow.predict(dt);
-    bodies.measure(flow, dt, motions);
-    bodies.apply(flow, motions);
-    flow.project(dt);
-}
 
 /// Drag factor K of a simple cubic array, F = 6 pi mu a K U, in Stokes flow along x, and the relative force balance.
 struct ArrayDrag {
