@@ -84,7 +84,6 @@ template <class Fill>
 void FineCoupling::average_blocks(Quads& quads, const Fill& fill) const
 {
     quads.resize(4 * blocks_.total);
-    const double closed = double(block_) * block_ * block_;
     const auto n = std::size_t(grid_.cells.x());
     parallel_blocks(std::size_t(blocks_.cells.z()), planes_per_slab, [&](std::size_t begin, std::size_t end) {
         std::fill(quads.begin() + 4 * std::ptrdiff_t(begin) * blocks_.stride[2],
@@ -92,7 +91,7 @@ void FineCoupling::average_blocks(Quads& quads, const Fill& fill) const
         thread_local std::vector<double> buffer;
         buffer.resize(4 * n);
         double* const rows[4] = {buffer.data(), buffer.data() + n, buffer.data() + 2 * n, buffer.data() + 3 * n};
-        for (int k = int(begin) * block_; k < int(end) * block_; ++k)
+        for (int k = int(begin) * block_; k < std::min(int(end) * block_, grid_.cells.z()); ++k)
             for (int j = 0; j < grid_.cells.y(); ++j) {
                 fill(j, k, rows);
                 const double* open_cells = open_cells_.data() + layout_.index(0, j, k);
@@ -100,11 +99,11 @@ void FineCoupling::average_blocks(Quads& quads, const Fill& fill) const
                 for (int i = 0, b = 0; i < grid_.cells.x(); ++b) {
                     const double open = open_blocks_[b0 + std::size_t(b)];
                     Vector4d sum = Vector4d::Zero();
-                    for (int l = 0; l < block_; ++l, ++i)
+                    for (const int last = std::min(i + block_, grid_.cells.x()); i < last; ++i)
                         sum += (open > 0.0 ? open_cells[i] : 1.0) *
                                Vector4d(rows[0][i], rows[1][i], rows[2][i], rows[3][i]);
                     Eigen::Map<Vector4d>(quads.data() + 4 * (b0 + std::size_t(b))) +=
-                        sum / (open > 0.0 ? open : closed);
+                        sum / (open > 0.0 ? open : cells_in_block(b, j / block_, k / block_));
                 }
             }
     });
@@ -272,11 +271,10 @@ void FineCoupling::cell_row(const Quads& block_values, int j, int k, double* row
 {
     const std::size_t c0 = layout_.index(0, j, k);
     const auto b0 = std::size_t((k / block_) * blocks_.stride[2] + (j / block_) * blocks_.stride[1]);
-    const double closed = double(block_) * block_ * block_;
     for (int i = 0, b = 0; i < grid_.cells.x(); ++b) {
         const double open = open_blocks_[b0 + std::size_t(b)];
-        const Vector4d per_open = quad(block_values, b0 + std::size_t(b)) / (open > 0.0 ? open : closed);
-        for (int l = 0; l < block_; ++l, ++i)
+        const Vector4d per_open = quad(block_values, b0 + std::size_t(b)) / (open > 0.0 ? open : cells_in_block(b, j / block_, k / block_));
+        for (const int last = std::min(i + block_, grid_.cells.x()); i < last; ++i)
             Eigen::Map<Vector4d>(row + 4 * i) = (open > 0.0 ? open_cells_[c0 + std::size_t(i)] : 1.0) * per_open;
     }
 }

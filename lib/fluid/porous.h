@@ -31,7 +31,7 @@ struct KernelOptions {
     double smallest_void_fraction = 0.15;
     SelfDisturbance self_disturbance = SelfDisturbance::removed;
     int coupling_cells =
-        0;  ///< felt averages work on blocks of this many cells along an edge; 0 chooses (1 when d < 3 cells)
+        0;  ///< felt averages work on blocks of this many cells along an edge; 0 chooses (1 when d < 2.8 cells)
 };
 
 /// Void fraction of the bed around a particle, from the kernel mean at its centre. The mean counts the particle's own
@@ -116,6 +116,7 @@ private:
 
     void sort_particles(std::span<const Eigen::Vector3d> positions);
     void choose_blocks(std::span<const double> diameters);
+    double cells_in_block(int i, int j, int k) const;
     void find_open(const Field* cell_solid);
     void find_weights(std::vector<Weights>& chunks, const Target& target, const Field& open, double factor,
                       std::span<const Eigen::Vector3d> positions, std::span<const double> diameters) const;

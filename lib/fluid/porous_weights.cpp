@@ -98,22 +98,30 @@ std::size_t FineCoupling::stored_weights() const
     return sum;
 }
 
-/// Largest block that divides the grid and leaves 1.5 blocks per smallest diameter: the felt averages do not change
-/// by it.
+/// Largest block that leaves about 1.5 blocks per smallest diameter: the felt averages do not change by it. Blocks divide
+/// periodic axes; elsewhere the last one may be cut short by the wall.
 void FineCoupling::choose_blocks(std::span<const double> diameters)
 {
+    constexpr double blocks_per_diameter = 1.4;
     block_ = std::max(options_.coupling_cells, 1);
     if (options_.coupling_cells <= 0) {
-        double smallest = 4.0 * 1.5 * grid_.cell;  // no more than 4 cells
+        double smallest = 4.0 * blocks_per_diameter * grid_.cell;  // no more than 4 cells
         for (const double d : diameters) smallest = std::min(smallest, d);
-        block_ = std::max(1, int(smallest / (1.5 * grid_.cell) + 1e-9));
+        block_ = std::max(1, int(smallest / (blocks_per_diameter * grid_.cell) + 1e-9));
     }
-    while (block_ > 1 && ((grid_.cells.array() / block_) * block_ != grid_.cells.array()).any()) --block_;
-    blocks_.cells = grid_.cells / block_;
+    const auto divides = [&](int d) { return !grid_.periodic(d) || grid_.cells[d] % block_ == 0; };
+    while (block_ > 1 && !(divides(0) && divides(1) && divides(2))) --block_;
+    blocks_.cells = (grid_.cells.array() + block_ - 1) / block_;
     blocks_.cell = grid_.cell * block_;
     blocks_.stride = {1, blocks_.cells.x(), std::ptrdiff_t(blocks_.cells.x()) * blocks_.cells.y()};
     blocks_.offset = 0;
     blocks_.total = std::size_t(blocks_.stride[2]) * std::size_t(blocks_.cells.z());
+}
+
+double FineCoupling::cells_in_block(int i, int j, int k) const
+{
+    const Vector3i first = block_ * Vector3i(i, j, k);
+    return double((grid_.cells - first).cwiseMin(Vector3i::Constant(block_)).prod());
 }
 
 void FineCoupling::find_open(const Field* cell_solid)
@@ -122,7 +130,7 @@ void FineCoupling::find_open(const Field* cell_solid)
     parallel_blocks(std::size_t(blocks_.cells.z()), planes_per_slab, [&](std::size_t begin, std::size_t end) {
         const auto first = open_blocks_.begin() + std::ptrdiff_t(begin) * blocks_.stride[2];
         std::fill(first, open_blocks_.begin() + std::ptrdiff_t(end) * blocks_.stride[2], 0.0);
-        for (int k = int(begin) * block_; k < int(end) * block_; ++k)
+        for (int k = int(begin) * block_; k < std::min(int(end) * block_, grid_.cells.z()); ++k)
             for (int j = 0; j < grid_.cells.y(); ++j) {
                 const std::size_t c0 = layout_.index(0, j, k);
                 double* sum = open_blocks_.data() + (k / block_) * blocks_.stride[2] + (j / block_) * blocks_.stride[1];

@@ -245,7 +245,7 @@ TEST(FineCoupling, feels_a_uniform_flow_exactly_whatever_the_blocks)
 
 TEST(FineCoupling, feels_a_uniform_flow_exactly_beside_walls_and_grains)
 {
-    GridSpec grid = box({16, 16, 20}, 1e-3, BoundaryKind::slip);
+    GridSpec grid = box({17, 15, 20}, 1e-3, BoundaryKind::slip);  // a last block cut short on two axes
     grid.boundary[z_minus].kind = grid.boundary[z_plus].kind = BoundaryKind::periodic;
     std::vector<RigidMotion> motions(1);
     motions[0].position = Vector3d(8e-3, 8e-3, 8e-3);
@@ -258,6 +258,7 @@ TEST(FineCoupling, feels_a_uniform_flow_exactly_beside_walls_and_grains)
     fines.add({0.3e-3, 0.2e-3, 9e-3}, 2e-3);  // in an edge of the box
     fines.add({8e-3, 3.1e-3, 8e-3}, 2e-3);    // touches the grain
     fines.add({1.2e-3, 8e-3, 8e-3}, 2.4e-3);  // between grain and wall
+    fines.add({16.6e-3, 14.8e-3, 9e-3}, 2e-3);
     for (const int cells : {1, 2}) {
         KernelOptions options;
         options.coupling_cells = cells;
@@ -308,7 +309,7 @@ TEST(FineCoupling, exchanges_momentum_with_the_flow_to_round_off)
 {
     for (const BoundaryKind kind : {BoundaryKind::slip, BoundaryKind::periodic, BoundaryKind::wall})
         for (const int grain : {0, 1}) {
-            GridSpec grid = box({16, 14, 20}, 1e-3, kind);
+            GridSpec grid = box({16, 14, 21}, 1e-3, kind);
             grid.boundary[z_plus] = {BoundaryKind::inlet, Vector3d(0.0, 0.0, -0.05), 0.0};
             grid.boundary[z_minus].kind = BoundaryKind::outlet;
             Flow flow(grid, {});
@@ -323,6 +324,7 @@ TEST(FineCoupling, exchanges_momentum_with_the_flow_to_round_off)
             fines.add({3e-3, 3e-3, 3e-3}, 5e-3), fines.add({3e-3, 3e-3, 3e-3}, 5e-3);  // denser than the limit: clipped
             KernelOptions options;
             options.smallest_void_fraction = 0.3;
+            options.coupling_cells = 1 + grain;  // blocks of two: the last one along z is cut short
             FineCoupling coupling(grid, options);
             for (int step = 0; step < 12; ++step) {
                 const double dt = flow.stable_time_step();
