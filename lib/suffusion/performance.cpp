@@ -12,10 +12,11 @@ std::vector<Measure> performance_of(const Simulation& simulation, std::span<cons
             if (m.name == name) return m.value;
         return 0.0;
     };
-    const auto count = [&](const char* name, const char* unit, double now) {
+    // Watches start anew in each part of a run; counters are part of the state that a checkpoint brings back.
+    const auto add_watch = [&](const char* name, double now) {
         for (const Measure& m : earlier)
             if (m.name == name) now += m.value;
-        measures.push_back({name, unit, now});
+        measures.push_back({name, "s", now});
     };
     const Timing& t = simulation.timing();
     const dem::Counters& dem = simulation.scene().world.counters();
@@ -23,24 +24,24 @@ std::vector<Measure> performance_of(const Simulation& simulation, std::span<cons
     if (simulation.has_flow()) {
         const fluid::FlowTimes& f = simulation.flow().times();
         cells = static_cast<double>(simulation.flow().grid().cell_count());
-        count("seconds_predictor", "s", f.predictor);
-        count("seconds_poisson", "s", f.poisson);
-        count("seconds_correction", "s", f.correction);
-        count("seconds_grains", "s", t.grains);
-        count("seconds_fines", "s", t.fines);
-        count("seconds_flow", "s", t.flow + t.grains + t.fines);
+        add_watch("seconds_predictor", f.predictor);
+        add_watch("seconds_poisson", f.poisson);
+        add_watch("seconds_correction", f.correction);
+        add_watch("seconds_grains", t.grains);
+        add_watch("seconds_fines", t.fines);
+        add_watch("seconds_flow", t.flow + t.grains + t.fines);
     }
-    count("seconds_contact", "s", t.contact);
-    count("seconds_contact_pairs", "s", dem.seconds_pairs);
-    count("seconds_contact_integration", "s", dem.seconds_integration);
-    count("seconds_contact_lists", "s", dem.seconds_lists);
-    count("seconds_setup", "s", t.setup);
-    count("seconds_output", "s", t.output);
-    count("flow_steps", "1", simulation.has_flow() ? static_cast<double>(simulation.flow().times().steps) : 0);
-    count("dem_steps", "1", static_cast<double>(dem.steps));
-    count("contacts", "1", static_cast<double>(dem.contacts));
-    count("node_tests", "1", static_cast<double>(dem.node_tests));
-    count("pair_tests", "1", static_cast<double>(dem.pair_tests));
+    add_watch("seconds_contact", t.contact);
+    measures.push_back({"seconds_contact_pairs", "s", dem.seconds_pairs});
+    measures.push_back({"seconds_contact_integration", "s", dem.seconds_integration});
+    measures.push_back({"seconds_contact_lists", "s", dem.seconds_lists});
+    add_watch("seconds_setup", t.setup);
+    add_watch("seconds_output", t.output);
+    measures.push_back({"flow_steps", "1", simulation.has_flow() ? static_cast<double>(simulation.flow().times().steps) : 0});
+    measures.push_back({"dem_steps", "1", static_cast<double>(dem.steps)});
+    measures.push_back({"contacts", "1", static_cast<double>(dem.contacts)});
+    measures.push_back({"node_tests", "1", static_cast<double>(dem.node_tests)});
+    measures.push_back({"pair_tests", "1", static_cast<double>(dem.pair_tests)});
     measures.push_back({"cells", "1", cells});
     measures.push_back({"threads", "1", static_cast<double>(thread_count())});
     const double flow_seconds = value("seconds_flow"), contact_seconds = value("seconds_contact"), pair_seconds = value("seconds_contact_pairs");

@@ -142,6 +142,11 @@ TEST(Suffuse, stopped_and_resumed_run_ends_as_one_never_stopped)
     ASSERT_EQ(rest.exit_code, 0) << rest.err;
     EXPECT_NE(rest.err.find("resumed at t = 0.007"), std::string::npos) << rest.err;
     expect_equal_results(folder.path() / "whole/results.h5", folder.path() / "parts/results.h5");
+    const H5File whole = H5File::open(folder.path() / "whole/results.h5"), parts = H5File::open(folder.path() / "parts/results.h5");
+    for (const char* name : {"flow_steps", "dem_steps", "contacts"}) {
+        const std::string path = std::string("/performance/") + name;
+        EXPECT_EQ(whole.read_doubles(path), parts.read_doubles(path)) << name;
+    }
 }
 
 TEST(Suffuse, killed_run_goes_on_from_its_checkpoint_to_the_same_series)
