@@ -62,19 +62,18 @@ struct Places {
         force[count].setZero();
         energy[count++] = 0.0;
     }
-    void add(const detail::Press& press)
+    void add(const Vec3& push, double size, double stored)
     {
-        const Vec3 direction = press.force.normalized();
         int best = -1;
-        double nearest = count < Slots::count ? same_wall : -2.0;
+        double nearest = (count < Slots::count ? same_wall : -2.0) * size;
         for (int k = 0; k < count; ++k)
-            if (const double c = key[k].dot(direction); c > nearest) {
+            if (const double c = key[k].dot(push); c > nearest) {
                 nearest = c;
                 best = k;
             }
-        if (best < 0) open(direction, -1), best = count - 1;
-        force[best] += press.force;
-        energy[best] += press.energy;
+        if (best < 0) open(push / size, -1), best = count - 1;
+        force[best] += push;
+        energy[best] += stored;
     }
     /// A deep press that was taken for several places, seen as one: `from` becomes part of `to`.
     void merge(int to, int from)
@@ -116,21 +115,24 @@ bool World::Impl::press_on_walls(std::size_t k, double dt, GeneralForce& out, Lo
     const Vec3 offset = periodic(x[i] - x[j]);
     const Vec3 local = q[j].conjugate() * offset / scale[j];
     // Triangles that were farther away when they were gathered than the sphere has come since are not looked at.
-    constexpr double stale = 0.01;  // of the radius: in a close-fitting void every bit of way brings up many triangles
+    const Pocket& pocket = l.pocket[k];
     const double r = radius[i] / scale[j];
     double moved = (local - l.listed[k]).norm();
-    if (r + (local - l.cut[k]).norm() > l.within[k]) {
-        make_pocket_here(k);
+    const auto is_loose = [&] { return l.touch[k] == 0 && moved < pocket.room; };
+    if (is_loose()) return false;
+    const bool outside = r + (local - l.cut[k]).norm() > l.within[k];
+    if (outside || moved > stale_way * r) {
+        if (outside) {
+            make_pocket_here(k);
+        } else {
+            l.listed[k] = local;
+            gather_pocket(k);
+        }
         moved = 0.0;
-    } else if (moved > stale * r) {
-        l.listed[k] = local;
-        gather_pocket(k);
-        moved = 0.0;
+        if (is_loose()) return false;
     }
-    const double reach = r + moved;
-    const Pocket& pocket = l.pocket[k];
     std::size_t end = 0;
-    while (end < pocket.near.size() && double(pocket.near[end].clearance) < reach) ++end;
+    while (end < pocket.near.size() && double(pocket.near[end].clearance) < r + moved) ++end;
     if (l.touch[k] == 0 && end == 0) return false;
     const PairLaw& pair = law(material[i], material[j]);
     const double stiffness = pair.kn * scale[j] * scale[j] / (2.0 * std::numbers::pi * radius[i]);
@@ -138,12 +140,16 @@ bool World::Impl::press_on_walls(std::size_t k, double dt, GeneralForce& out, Lo
     Places places(slots);
     PressMemory now;
     Vec3 push = Vec3::Zero();
-    detail::Press press;
-    for (std::size_t f = 0; f < end; ++f) {
-        if (!pocket.surface->press(pocket.near[f].triangle, local, radius[i] / scale[j], press)) continue;
-        places.add(press);
-        push += stiffness * press.force;
-        now.stored += stiffness * scale[j] * press.energy;
+    detail::QuadPress press;
+    for (std::size_t f = 0; f < end; f += detail::lane_count) {
+        if (!detail::press_on(pocket.quads[f / detail::lane_count], local, r, press)) continue;
+        for (int lane = 0; lane < detail::lane_count; ++lane) {
+            if (!press.covered[lane]) continue;
+            const Vec3 pressed = detail::lane(press.force, lane);
+            places.add(pressed, press.size[lane], press.energy[lane]);
+            push += stiffness * pressed;
+            now.stored += stiffness * scale[j] * press.energy[lane];
+        }
     }
     for (int to = 0; to < places.count; ++to)
         for (int from = to + 1; from < places.count; ++from) places.merge(to, from);

@@ -163,8 +163,14 @@ void World::Impl::make_pocket(std::size_t k)
 void World::Impl::gather_pocket(std::size_t k)
 {
     SphereGridList& l = sphere_grids;
-    l.pocket[k].near.clear();
-    l.pocket[k].surface->gather(l.listed[k], l.within[k] - (l.listed[k] - l.cut[k]).norm(), l.pocket[k].near);
+    Pocket& pocket = l.pocket[k];
+    const double r = radius[std::size_t(l.sphere[k])] / scale[std::size_t(l.grid[k])], sight = l.within[k] - (l.listed[k] - l.cut[k]).norm();
+    pocket.near.clear();
+    pocket.surface->gather(l.listed[k], sight, pocket.near);
+    std::size_t count = 0;
+    while (count < pocket.near.size() && double(pocket.near[count].clearance) < (1.0 + stale_way) * r) ++count;
+    pocket.surface->lay_out({pocket.near.data(), count}, pocket.quads);
+    pocket.room = (pocket.near.empty() ? sight : double(pocket.near.front().clearance)) - r;
 }
 
 void World::Impl::make_pocket_here(std::size_t k)

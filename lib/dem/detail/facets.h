@@ -1,25 +1,15 @@
 #pragma once
 /// \file dem/detail/facets.h
-/// The surface of a lattice as triangles, and what a ball presses on each of them.
-///
-/// A ball of radius R at c stores in the surface that it covers
-///     U = k_a int (R^2 - |c - x|^2)/(2R) dA over |x - c| < R,  k_a = kn/(2 pi R),      F = -dU/dc = k_a int (c - x)/R dA
-/// On a plane at overlap d this is kn d^2/2 (1 - d/2R)^2: the linear law. It is a sum over the surface, so that every wall that the ball
-/// touches has its part without being found as one, and a polynomial in the plane of each triangle, so that it and its gradient are exact.
+/// The surface of a lattice as triangles, found by place.
 #include <Eigen/Core>
 #include <cstdint>
-#include <memory>
+#include <span>
 #include <vector>
 
+#include "dem/detail/facet_quads.h"
 #include "sdf/distance_grid.h"
 
 namespace coral::dem::detail {
-
-/// Integrals over a part of the surface.
-struct Press {
-    Eigen::Vector3d force = Eigen::Vector3d::Zero();  ///< int (c - x)/R dA [m2]
-    double energy = 0.0;                              ///< int (R^2 - |c - x|^2)/(2R) dA [m3]
-};
 
 class Facets {
 public:
@@ -36,8 +26,8 @@ public:
     };
     /// Appends the triangles that come within `distance` of a point, nearest first.
     void gather(const Eigen::Vector3d& point, double distance, std::vector<Near>& list) const;
-    /// What a ball presses on one triangle. \returns whether it covers any of it
-    bool press(std::int32_t triangle, const Eigen::Vector3d& centre, double radius, Press& press) const;
+    /// Lays triangles out for press_on(), in the order of the list; what is left over of the last quad touches nothing.
+    void lay_out(std::span<const Near> list, std::vector<FacetQuad>& quads) const;
 
 private:
     double clearance(std::int32_t triangle, const Eigen::Vector3d& point) const;

@@ -154,10 +154,14 @@ struct PressMemory {
     double owed = 0.0;                 ///< error of the work that waits for correction [J]
     detail::CellMemory cell;
 };
+/// Way after which the triangles near a sphere are gathered anew, over its radius: in a close-fitting void every bit of way brings up many.
+constexpr double stale_way = 0.01;
 /// The part of a surface that a sphere may touch.
 struct Pocket {
     std::shared_ptr<const detail::Facets> surface;
     std::vector<detail::Facets::Near> near;  ///< nearest first
+    std::vector<detail::FacetQuad> quads;    ///< those of them that may touch before they are gathered anew
+    double room = 0.0;                       ///< way from where they were gathered within which nothing touches [m]
 };
 struct SphereGridList {
     std::vector<Index> sphere, grid;

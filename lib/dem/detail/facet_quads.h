@@ -1,0 +1,36 @@
+#pragma once
+/// \file dem/detail/facet_quads.h
+/// What a ball presses on triangles, four at a time.
+///
+/// A ball of radius R at c stores in the surface that it covers
+///     U = k_a int (R^2 - |c - x|^2)/(2R) dA over |x - c| < R,  k_a = kn/(2 pi R),      F = -dU/dc = k_a int (c - x)/R dA
+/// On a plane at overlap d this is kn d^2/2 (1 - d/2R)^2: the linear law. It is a sum over the surface, so that every wall that the ball
+/// touches has its part without being found as one, and a polynomial in the plane of each triangle, so that it and its gradient are exact.
+#include "dem/detail/lanes.h"
+
+namespace coral::dem::detail {
+
+/// Four triangles side by side, with what stays the same while a ball moves over them.
+struct FacetQuad {
+    Vec3Lanes corner[3];
+    Vec3Lanes normal;      ///< unit; the corners run counter-clockwise about it
+    Lanes per_length[3];   ///< 1 / length of the side that begins at each corner [1/m]
+
+    /// Puts a triangle into a lane. Its corners must span an area.
+    void set(int lane, const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c);
+    /// A lane that no ball touches.
+    void clear(int lane);
+};
+
+/// Integrals over what a ball covers of each of four triangles.
+struct QuadPress {
+    bool covered[lane_count] = {};
+    Vec3Lanes force;  ///< int (c - x)/R dA [m2]
+    Lanes size;       ///< of the force [m2]
+    Lanes energy;     ///< int (R^2 - |c - x|^2)/(2R) dA [m3]
+};
+
+/// \returns whether the ball covers any part of any of them; `press` is set only then
+bool press_on(const FacetQuad& quad, const Eigen::Vector3d& centre, double radius, QuadPress& press);
+
+}  // namespace coral::dem::detail
