@@ -80,7 +80,7 @@ struct LaneSums {
     }
     void add_to(LoopSums& s) const
     {
-        const auto sum = [](Lanes l) { return (l[0] + l[1]) + (l[2] + l[3]); };
+        using detail::sum;
         s.elastic_normal += sum(stored_normal);
         s.elastic_tangential += sum(stored_tangential);
         s.friction += sum(friction);

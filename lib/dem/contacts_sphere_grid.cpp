@@ -10,6 +10,8 @@ namespace coral::dem {
 
 namespace {
 
+using detail::Lanes;
+
 constexpr double same_wall = 0.8;  ///< cosine: places on a sphere within 37 degrees of each other share a friction spring
 
 /// Slot of the wall with this normal (frame of the grid), or a new one.
@@ -55,6 +57,38 @@ struct Places {
         for (int k = 0; k < Slots::count; ++k)
             if (slots.used >> k & 1) open(slots.normal[k], k);
     }
+    /// Presses of triangles, each to the place that it is nearest to, or to a new one.
+    void add(const detail::QuadPress& press)
+    {
+        const Lanes zero = detail::all(0.0), none = detail::all(-1.0);
+        Lanes nearest = detail::all(same_wall) * press.size, to = none;
+        for (int k = 0; k < count; ++k) {
+            const Lanes along = detail::dot({detail::all(key[k].x()), detail::all(key[k].y()), detail::all(key[k].z())}, press.force);
+            to = along > nearest ? detail::all(double(k)) : to;
+            nearest = detail::max(along, nearest);
+        }
+        to = press.covered > zero ? to : detail::all(-2.0);
+        for (int k = 0; k < count; ++k) {
+            const Lanes part = to == detail::all(double(k)) ? detail::all(1.0) : zero;
+            const detail::Vec3Lanes pushed = part * press.force;
+            force[k] += Vec3(detail::sum(pushed.x), detail::sum(pushed.y), detail::sum(pushed.z));
+            energy[k] += detail::sum(part * press.energy);
+        }
+        for (int lane = 0; lane < detail::lane_count; ++lane)
+            if (to[lane] == -1.0) add_one(detail::lane(press.force, lane), press.size[lane], press.energy[lane]);
+    }
+    /// A deep press that was taken for several places, seen as one: `from` becomes part of `to`.
+    void merge(int to, int from)
+    {
+        const double product = force[to].norm() * force[from].norm();
+        if (!(product > 0.0) || force[to].dot(force[from]) < same_wall * product) return;
+        force[to] += force[from];
+        energy[to] += energy[from];
+        force[from].setZero();
+        if (slot[to] < 0) std::swap(slot[to], slot[from]);
+    }
+
+private:
     void open(const Vec3& normal, int from)
     {
         slot[count] = from;
@@ -62,7 +96,7 @@ struct Places {
         force[count].setZero();
         energy[count++] = 0.0;
     }
-    void add(const Vec3& push, double size, double stored)
+    void add_one(const Vec3& push, double size, double stored)
     {
         int best = -1;
         double nearest = (count < Slots::count ? same_wall : -2.0) * size;
@@ -74,16 +108,6 @@ struct Places {
         if (best < 0) open(push / size, -1), best = count - 1;
         force[best] += push;
         energy[best] += stored;
-    }
-    /// A deep press that was taken for several places, seen as one: `from` becomes part of `to`.
-    void merge(int to, int from)
-    {
-        const double product = force[to].norm() * force[from].norm();
-        if (!(product > 0.0) || force[to].dot(force[from]) < same_wall * product) return;
-        force[to] += force[from];
-        energy[to] += energy[from];
-        force[from].setZero();
-        if (slot[to] < 0) std::swap(slot[to], slot[from]);
     }
 };
 
@@ -131,9 +155,7 @@ bool World::Impl::press_on_walls(std::size_t k, double dt, GeneralForce& out, Lo
         moved = 0.0;
         if (is_loose()) return false;
     }
-    std::size_t end = 0;
-    while (end < pocket.near.size() && double(pocket.near[end].clearance) < r + moved) ++end;
-    if (l.touch[k] == 0 && end == 0) return false;
+    if (l.touch[k] == 0 && (pocket.quads.empty() || pocket.quads.front().clearance >= r + moved)) return false;
     const PairLaw& pair = law(material[i], material[j]);
     const double stiffness = pair.kn * scale[j] * scale[j] / (2.0 * std::numbers::pi * radius[i]);
     Slots& slots = l.slots[k];
@@ -141,15 +163,13 @@ bool World::Impl::press_on_walls(std::size_t k, double dt, GeneralForce& out, Lo
     PressMemory now;
     Vec3 push = Vec3::Zero();
     detail::QuadPress press;
-    for (std::size_t f = 0; f < end; f += detail::lane_count) {
-        if (!detail::press_on(pocket.quads[f / detail::lane_count], local, r, press)) continue;
-        for (int lane = 0; lane < detail::lane_count; ++lane) {
-            if (!press.covered[lane]) continue;
-            const Vec3 pressed = detail::lane(press.force, lane);
-            places.add(pressed, press.size[lane], press.energy[lane]);
-            push += stiffness * pressed;
-            now.stored += stiffness * scale[j] * press.energy[lane];
-        }
+    for (const detail::FacetQuad& quad : pocket.quads) {
+        if (quad.clearance >= r + moved) break;
+        if (detail::press_on(quad, local, r, press)) places.add(press);
+    }
+    for (int p = 0; p < places.count; ++p) {
+        push += stiffness * places.force[p];
+        now.stored += stiffness * scale[j] * places.energy[p];
     }
     for (int to = 0; to < places.count; ++to)
         for (int from = to + 1; from < places.count; ++from) places.merge(to, from);
@@ -318,10 +338,18 @@ void World::Impl::sphere_grid_loop(double dt)
             const std::size_t k = std::size_t(l.near[n]);
             for (const auto& [data, size] : {std::pair<const void*, std::size_t>{&l.press[k], sizeof(PressMemory)}, {&l.slots[k], sizeof(Slots)}})
                 for (std::size_t byte = 0; byte < size; byte += 64) __builtin_prefetch(static_cast<const char*>(data) + byte, 1);
+            if (nearest || !(l.within[k] > 0.0)) return;
+            const auto* quads = reinterpret_cast<const char*>(l.pocket[k].quads.data());
+            for (std::size_t byte = 0; byte < 2 * sizeof(detail::FacetQuad); byte += 64) __builtin_prefetch(quads + byte);
         };
         constexpr std::size_t ahead = 4;
+        const auto fetch_pocket = [&](std::size_t n) {
+            if (!nearest) __builtin_prefetch(&l.pocket[std::size_t(l.near[n])].quads);
+        };
+        for (std::size_t n = first; n < std::min(first + 2 * ahead, count); ++n) fetch_pocket(n);
         for (std::size_t n = first; n < std::min(first + ahead, count); ++n) fetch(n);
         for (std::size_t n = first; n < count; ++n) {
+            if (n + 2 * ahead < count) fetch_pocket(n + 2 * ahead);
             if (n + ahead < count) fetch(n + ahead);
             const std::size_t k = std::size_t(l.near[n]);
             ++s.node_queries;

@@ -110,7 +110,7 @@ bool press_on(const FacetQuad& quad, const Eigen::Vector3d& centre, double radiu
     press.energy = all(0.5 / radius) * (parts.a2 * parts.area - parts.polar);
     press.size = sqrt(dot(press.force, press.force));
     const Mask covered = reached & (parts.area > zero) & (press.energy > zero);
-    for (int k = 0; k < lane_count; ++k) press.covered[k] = covered[k] != 0;
+    press.covered = covered ? all(1.0) : zero;
     return any(covered);
 }
 

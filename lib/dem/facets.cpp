@@ -113,6 +113,7 @@ void Facets::lay_out(std::span<const Near> list, std::vector<FacetQuad>& quads) 
     for (std::size_t n = 0; n < lane_count * quads.size(); ++n) {
         FacetQuad& quad = quads[n / lane_count];
         const int lane = int(n % lane_count);
+        if (lane == 0) quad.clearance = double(list[n].clearance);
         if (n >= list.size()) {
             quad.clear(lane);
             continue;

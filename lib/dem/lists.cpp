@@ -165,12 +165,13 @@ void World::Impl::gather_pocket(std::size_t k)
     SphereGridList& l = sphere_grids;
     Pocket& pocket = l.pocket[k];
     const double r = radius[std::size_t(l.sphere[k])] / scale[std::size_t(l.grid[k])], sight = l.within[k] - (l.listed[k] - l.cut[k]).norm();
-    pocket.near.clear();
-    pocket.surface->gather(l.listed[k], sight, pocket.near);
+    thread_local std::vector<detail::Facets::Near> near;
+    near.clear();
+    pocket.surface->gather(l.listed[k], sight, near);
     std::size_t count = 0;
-    while (count < pocket.near.size() && double(pocket.near[count].clearance) < (1.0 + stale_way) * r) ++count;
-    pocket.surface->lay_out({pocket.near.data(), count}, pocket.quads);
-    pocket.room = (pocket.near.empty() ? sight : double(pocket.near.front().clearance)) - r;
+    while (count < near.size() && double(near[count].clearance) < (1.0 + stale_way) * r) ++count;
+    pocket.surface->lay_out({near.data(), count}, pocket.quads);
+    pocket.room = (near.empty() ? sight : double(near.front().clearance)) - r;
 }
 
 void World::Impl::make_pocket_here(std::size_t k)

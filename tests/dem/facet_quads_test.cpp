@@ -38,7 +38,7 @@ FacetQuad quad_of(const std::array<Triangle, 4>& triangles)
 double energy_of(const FacetQuad& quad, int k, const Vector3d& centre, double radius)
 {
     QuadPress press;
-    return press_on(quad, centre, radius, press) && press.covered[k] ? press.energy[k] : 0.0;
+    return press_on(quad, centre, radius, press) && press.covered[k] > 0.0 ? press.energy[k] : 0.0;
 }
 
 }  // namespace
@@ -88,7 +88,7 @@ TEST(FacetQuad, force_is_what_the_energy_loses_on_the_way)
         QuadPress press;
         const bool any = press_on(quad, centre, radius, press);
         for (int k = 0; k < 4; ++k) {
-            const Vector3d force = any && press.covered[k] ? lane(press.force, k) : Vector3d::Zero().eval();
+            const Vector3d force = any && press.covered[k] > 0.0 ? lane(press.force, k) : Vector3d::Zero().eval();
             for (int axis = 0; axis < 3; ++axis) {
                 const Vector3d h = step * Vector3d::Unit(axis);
                 const double slope = (energy_of(quad, k, centre + h, radius) - energy_of(quad, k, centre - h, radius)) / (2.0 * step);
@@ -107,8 +107,8 @@ TEST(FacetQuad, ball_on_a_wide_triangle_follows_the_linear_law)
     for (const double overlap : {1e-6, 1e-3, 0.1}) {
         QuadPress press;
         ASSERT_TRUE(press_on(quad, {0.1, 0.2, 1.0 - overlap}, 1.0, press));
-        EXPECT_TRUE(press.covered[0]);
-        EXPECT_FALSE(press.covered[1] || press.covered[2] || press.covered[3]);
+        EXPECT_EQ(press.covered[0], 1.0);
+        EXPECT_EQ(press.covered[1] + press.covered[2] + press.covered[3], 0.0);
         const double stiffness = 1.0 / (2.0 * std::numbers::pi);
         EXPECT_NEAR(stiffness * press.energy[0], 0.5 * overlap * overlap * (1.0 - 0.5 * overlap) * (1.0 - 0.5 * overlap), 1e-9 * overlap * overlap);
         EXPECT_NEAR(stiffness * press.force.z[0], overlap * (1.0 - overlap) * (1.0 - 0.5 * overlap), 1e-8 * overlap);
@@ -128,8 +128,8 @@ TEST(FacetQuad, triangle_beside_the_ball_in_its_own_plane_is_not_touched)
     quad.clear(3);
     QuadPress press;
     ASSERT_TRUE(press_on(quad, Vector3d::Zero(), 1.0, press));
-    EXPECT_FALSE(press.covered[0]);
-    EXPECT_TRUE(press.covered[1]);
+    EXPECT_EQ(press.covered[0], 0.0);
+    EXPECT_EQ(press.covered[1], 1.0);
     EXPECT_NEAR(press.energy[1], 0.5 * (0.005 - 1e-4 / 6.0), 1e-12);
-    EXPECT_FALSE(press.covered[2]);
+    EXPECT_EQ(press.covered[2], 0.0);
 }

@@ -15,6 +15,7 @@ struct FacetQuad {
     Vec3Lanes corner[3];
     Vec3Lanes normal;      ///< unit; the corners run counter-clockwise about it
     Lanes per_length[3];   ///< 1 / length of the side that begins at each corner [1/m]
+    double clearance;      ///< no triangle was nearer than this to where they were gathered [m]
 
     /// Puts a triangle into a lane. Its corners must span an area.
     void set(int lane, const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c);
@@ -24,7 +25,7 @@ struct FacetQuad {
 
 /// Integrals over what a ball covers of each of four triangles.
 struct QuadPress {
-    bool covered[lane_count] = {};
+    Lanes covered;    ///< 1 or 0: whether any of the triangle is; without it the other values mean nothing
     Vec3Lanes force;  ///< int (c - x)/R dA [m2]
     Lanes size;       ///< of the force [m2]
     Lanes energy;     ///< int (R^2 - |c - x|^2)/(2R) dA [m3]

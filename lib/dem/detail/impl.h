@@ -159,9 +159,8 @@ constexpr double stale_way = 0.01;
 /// The part of a surface that a sphere may touch.
 struct Pocket {
     std::shared_ptr<const detail::Facets> surface;
-    std::vector<detail::Facets::Near> near;  ///< nearest first
-    std::vector<detail::FacetQuad> quads;    ///< those of them that may touch before they are gathered anew
-    double room = 0.0;                       ///< way from where they were gathered within which nothing touches [m]
+    std::vector<detail::FacetQuad> quads;  ///< triangles that may touch before they are gathered anew, nearest first
+    double room = 0.0;                     ///< way from where they were gathered within which nothing touches [m]
 };
 struct SphereGridList {
     std::vector<Index> sphere, grid;

@@ -31,6 +31,8 @@ constexpr int lane_count = 4;
 [[gnu::always_inline]] inline Lanes min(Lanes a, Lanes b) { return a < b ? a : b; }
 [[gnu::always_inline]] inline Lanes max(Lanes a, Lanes b) { return a > b ? a : b; }
 
+[[gnu::always_inline]] inline double sum(Lanes a) { return (a[0] + a[1]) + (a[2] + a[3]); }
+
 struct Vec3Lanes {
     Lanes x, y, z;
 };
