@@ -7,42 +7,18 @@
 #include "core/parallel.h"
 #include "core/stopwatch.h"
 #include "core/text.h"
-#include "fluid/detail/lanes.h"
-#include "fluid/detail/raster.h"
+#include "fluid/detail/immersed_body.h"
 
 namespace coral::fluid {
 
-using detail::CutFace;
+using detail::OwnFaces;
 using detail::SolidRun;
-using detail::SolidSet;
 using Eigen::Vector3d;
-
-struct ImmersedBodies::Body {
-    BodyShape shape;
-    RigidMotion placed;
-    bool found = false;                             ///< faces belong to `placed`
-    std::array<SolidSet, 4> solid;                  ///< components and cells
-    std::array<std::vector<SolidRun>, 3> own_runs;  ///< runs without the faces shared with other bodies
-    Vector3d run_mass = Vector3d::Zero();           ///< of the own runs, in faces; about `placed` like the inertia
-    Eigen::Matrix3d run_inertia = Eigen::Matrix3d::Zero();  ///< [m2]
-};
-
-struct ImmersedBodies::Shared {
-    struct Share {
-        std::uint32_t body = 0;
-        double part = 0.0;                 ///< of the sum of fractions
-        std::int16_t i = 0, j = 0, k = 0;  ///< the face as the body sees it: bodies may meet across a periodic side
-    };
-    std::uint32_t at = 0;
-    int component = 0;
-    double fraction = 0.0, weight = 0.0;
-    std::vector<Share> shares;
-};
 
 ImmersedBodies::ImmersedBodies(const GridSpec& grid, const ForcingOptions& options)
     : grid_(grid), layout_(grid.cells), options_(options)
 {
-    for (Field& f : face_solid_) f = layout_.make_field();
+    for (Field& f : solid_sum_) f = layout_.make_field();
     cell_solid_ = layout_.make_field();
 }
 ImmersedBodies::ImmersedBodies(ImmersedBodies&&) noexcept = default;
@@ -60,12 +36,15 @@ std::size_t ImmersedBodies::add(BodyShape shape, const RigidMotion& motion)
     return bodies_.size() - 1;
 }
 
-void ImmersedBodies::rasterise(Body& body) const
+ImmersedBodies::Change ImmersedBodies::rasterise(std::size_t body) const
 {
+    const Body& from = *bodies_[body];
+    Change change;
+    change.body = body;
     for (int component = 0; component < 4; ++component)
-        body.solid[component] =
-            detail::find_solid(grid_, layout_, component, body.shape, body.placed, options_.fraction);
-    body.found = true;
+        change.solid[std::size_t(component)] =
+            detail::find_solid(grid_, layout_, component, from.shape, from.placed, options_.fraction);
+    return change;
 }
 
 void ImmersedBodies::place(std::span<const RigidMotion> motions)
@@ -79,13 +58,13 @@ void ImmersedBodies::place(std::span<const RigidMotion> motions)
                               reach * motions[b].orientation.angularDistance(body.placed.orientation);
         if (body.found && !(travel > tolerance)) continue;
         body.placed = motions[b];
+        body.found = true;
         moved.push_back(b);
     }
     if (moved.empty()) return;
-    parallel_blocks(moved.size(), 1, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t m = begin; m < end; ++m) rasterise(*bodies_[moved[m]]);
-    });
-    merge();
+    std::vector<Change> changes(moved.size());
+    parallel_blocks(moved.size(), 1, [&](std::size_t m, std::size_t) { changes[m] = rasterise(moved[m]); });
+    merge(changes);
 }
 
 std::vector<RigidMotion> ImmersedBodies::placed_motions() const
@@ -107,84 +86,12 @@ void ImmersedBodies::restore(std::span<const RigidMotion> placed_motions)
     place(placed_motions);
 }
 
-/// Sums the solid fractions of all bodies and sets aside the faces on which several meet.
-void ImmersedBodies::merge()
-{
-    struct Claim {
-        std::uint32_t at, body;
-        CutFace face;
-    };
-    std::array<std::vector<Claim>, 3> claims;
-    parallel_blocks(4, 1, [&](std::size_t component, std::size_t) {
-        Field& sum = component < 3 ? face_solid_[component] : cell_solid_;
-        std::fill(sum.begin(), sum.end(), 0.0);
-        for (const auto& body : bodies_) {
-            const SolidSet& set = body->solid[component];
-            for (const SolidRun& run : set.runs)
-                for (int l = 0; l < run.length; ++l) sum[run.at + std::uint32_t(l)] += 1.0;
-            for (const CutFace& cut : set.cuts) sum[cut.at] += double(cut.fraction);
-        }
-        if (component == detail::cells_component) {
-            for (double& value : sum) value = std::min(value, 1.0);
-            return;
-        }
-        for (std::size_t b = 0; b < bodies_.size(); ++b) {
-            SolidSet& set = bodies_[b]->solid[component];
-            std::vector<SolidRun>& own = bodies_[b]->own_runs[component];
-            own.clear();
-            for (CutFace& cut : set.cuts) {
-                cut.shared = sum[cut.at] != double(cut.fraction);
-                if (cut.shared) claims[component].push_back({cut.at, std::uint32_t(b), cut});
-            }
-            for (const SolidRun& run : set.runs) {
-                bool open = false;  // whether the last own run goes on
-                for (int l = 0; l < run.length; ++l) {
-                    const std::uint32_t at = run.at + std::uint32_t(l);
-                    const auto i = std::int16_t(run.i + l);
-                    if (sum[at] != 1.0) {
-                        claims[component].push_back({at, std::uint32_t(b), {at, i, run.j, run.k, true, 1.0F, 0.0F}});
-                        open = false;
-                    } else if (open) {
-                        ++own.back().length;
-                    } else {
-                        own.push_back({at, i, run.j, run.k, 1});
-                        open = true;
-                    }
-                }
-            }
-        }
-        for (const Claim& claim : claims[component]) sum[claim.at] = std::min(sum[claim.at], 1.0);
-    });
-    shared_.clear();
-    for (int component = 0; component < 3; ++component) {
-        std::vector<Claim>& list = claims[component];
-        std::sort(list.begin(), list.end(),
-                  [](const Claim& a, const Claim& b) { return std::pair(a.at, a.body) < std::pair(b.at, b.body); });
-        for (std::size_t first = 0, last = 0; first < list.size(); first = last) {
-            Shared shared;
-            shared.at = list[first].at;
-            shared.component = component;
-            double total = 0.0;
-            for (last = first; last < list.size() && list[last].at == list[first].at; ++last)
-                total += double(list[last].face.fraction);
-            for (std::size_t c = first; c < last; ++c) {
-                const CutFace& face = list[c].face;
-                shared.shares.push_back({list[c].body, double(face.fraction) / total, face.i, face.j, face.k});
-            }
-            shared.fraction = std::min(1.0, total);
-            shared_.push_back(std::move(shared));
-        }
-    }
-    ++version_;
-    weigh();
-}
-
 double ImmersedBodies::seen_volume(std::size_t body) const
 {
-    const SolidSet& cells = bodies_[body]->solid[detail::cells_component];
+    const detail::SolidSet& cells = bodies_[body]->solid[detail::cells_component];
     double volume = 0.0;
     for (const SolidRun& run : cells.runs) volume += run.length;
-    for (const CutFace& cut : cells.cuts) volume += double(cut.fraction);
+    for (const detail::CutFace& cut : cells.cuts) volume += double(cut.fraction);
     return volume * grid_.cell_volume();
 }
 
@@ -255,14 +162,21 @@ void for_each_component(const Body& body)
 }
 
 /// w of a face with solid fraction phi  [docs/numerics.md, eq. 7, 8].
-double forcing_weight(const ForcingOptions& options, double phi, double slip, double dt, double nu, double cell)
-{
-    if (phi >= 1.0) return 1.0;
-    if (options.plain_blend) return phi;
-    const double rate = options.viscous_rate * nu / (cell * cell) + options.inertial_rate * std::abs(slip) / cell;
-    const double chi = dt * rate * phi / (1.0 - phi);
-    return chi / (1.0 + chi);
-}
+struct ForcingRate {
+    double viscous, inertial;  ///< dt C1 nu/h2; dt C2/h [s/m]
+    bool plain_blend;
+
+    ForcingRate(const ForcingOptions& options, double dt, double nu, double cell)
+        : viscous(dt * options.viscous_rate * nu / (cell * cell)), inertial(dt * options.inertial_rate / cell),
+          plain_blend(options.plain_blend)
+    {
+    }
+    double weight(double phi, double slip) const
+    {
+        const double chi = (viscous + inertial * std::abs(slip)) * phi, open = 1.0 - phi;
+        return plain_blend || phi >= 1.0 ? phi : chi / (open + chi);
+    }
+};
 
 /// Growth of the solid's velocity per cell along a row.
 template <int c>
@@ -291,6 +205,42 @@ void weigh_runs(const std::vector<SolidRun>& runs, const Carrier& carrier, Vecto
     if (c == 2) inertia(1, 1) += spreads;
 }
 
+/// Mean void fraction of the two cells of a face.
+template <bool porous>
+double face_void(const double* eps, std::ptrdiff_t own, std::size_t at)
+{
+    if constexpr (porous) return 0.5 * (eps[at] + eps[std::ptrdiff_t(at) - own]);
+    return 1.0;
+}
+
+/// Rows and cut faces lie scattered in fields that do not fit the cache: what the loops will need is asked for in time.
+template <bool porous>
+class Prefetch {
+public:
+    Prefetch(const double* us, const double* eps, std::ptrdiff_t own) : us_(us), eps_(eps), own_(own) {}
+    void row(const std::vector<SolidRun>& runs, std::size_t now) const
+    {
+        constexpr std::size_t ahead = 4;
+        constexpr int line = 8;
+        if (now + ahead >= runs.size()) return;
+        const SolidRun& run = runs[now + ahead];
+        for (int l = 0; l < run.length + line - 1; l += line) face(run.at + std::uint32_t(std::min(l, run.length - 1)));
+    }
+    void face(std::uint32_t at) const
+    {
+        __builtin_prefetch(us_ + at, 1);
+        if constexpr (porous) {
+            __builtin_prefetch(eps_ + at);
+            __builtin_prefetch(eps_ + (std::ptrdiff_t(at) - own_));
+        }
+    }
+
+private:
+    const double *us_, *eps_;
+    std::ptrdiff_t own_;
+};
+constexpr int cuts_ahead = 24;
+
 /// Reaction of the solid rows of one component; sums of (u* - u_s) eps, not yet times rho V / dt.
 template <int c, bool porous>
 void measure_runs(const Flow& flow, const std::vector<SolidRun>& runs, const Carrier& carrier, FluidAction& action)
@@ -299,23 +249,26 @@ void measure_runs(const Flow& flow, const std::vector<SolidRun>& runs, const Car
     const double* eps = porous ? flow.porous_fields().void_fraction.data() : nullptr;
     const std::ptrdiff_t own = flow.layout().stride[c];
     const double slope = row_slope<c>(carrier);
+    const Prefetch<porous> prefetch(us, eps, own);
     double force = 0.0;
     Vector3d torque = Vector3d::Zero();
-    for (const SolidRun& run : runs) {
+    for (std::size_t n = 0; n < runs.size(); ++n) {
+        prefetch.row(runs, n);
+        const SolidRun& run = runs[n];
         const Vector3d r = carrier.arm(c, run.i, run.j, run.k);
         const double body = carrier.component_velocity(c, r);
-        const double* row = us + run.at;
-        const auto slip = [&](std::ptrdiff_t l) {
-            const double plain = row[l] - (body + slope * double(l));
-            if constexpr (porous) return 0.5 * (eps[run.at + l] + eps[run.at + l - own]) * plain;
-            return plain;
-        };
-        const double f = detail::lane_sum(run.length, slip);
-        const double fx =
-            c == 0 ? 0.0
-                   : carrier.cell * detail::lane_sum(run.length, [&](std::ptrdiff_t l) { return double(l) * slip(l); });
+        const double *row = us + run.at, *high = porous ? eps + run.at : nullptr, *low = porous ? high - own : nullptr;
+        const int length = run.length;
+        double f = 0.0, fx = 0.0;
+#pragma omp simd reduction(+ : f, fx)
+        for (int l = 0; l < length; ++l) {
+            double part = row[l] - (body + slope * l);
+            if constexpr (porous) part *= 0.5 * (high[l] + low[l]);
+            f += part;
+            if constexpr (c != 0) fx += l * part;
+        }
         force += f;
-        add_torque<c>(torque, r, f, fx);
+        add_torque<c>(torque, r, f, carrier.cell * fx);
     }
     action.force[c] += force;
     action.torque += torque;
@@ -323,90 +276,117 @@ void measure_runs(const Flow& flow, const std::vector<SolidRun>& runs, const Car
 
 /// The same for cut faces, whose weights are found here.
 template <int c, bool porous>
-void measure_cuts(const Flow& flow, const ForcingOptions& options, double dt, std::vector<CutFace>& cuts,
-                  const Carrier& carrier, FluidAction& action)
+void measure_cuts(const Flow& flow, const ForcingOptions& options, double dt, OwnFaces& faces, const Carrier& carrier,
+                  FluidAction& action)
 {
+    constexpr int a = (c + 1) % 3, b = (c + 2) % 3;
     const double* us = flow.provisional(c).data();
     const double* eps = porous ? flow.porous_fields().void_fraction.data() : nullptr;
     const std::ptrdiff_t own = flow.layout().stride[c];
-    double force = 0.0, total = 0.0;
-    Vector3d torque = Vector3d::Zero(), moments = Vector3d::Zero();
-    for (CutFace& cut : cuts) {
-        if (cut.shared) continue;
-        const Vector3d r = carrier.arm(c, cut.i, cut.j, cut.k);
-        const double slip = us[cut.at] - carrier.component_velocity(c, r);
-        const double weight =
-            forcing_weight(options, double(cut.fraction), slip, dt, flow.options().kinematic_viscosity, carrier.cell);
-        cut.weight = float(weight);
-        double mass = double(cut.weight);
-        if constexpr (porous) mass *= 0.5 * (eps[cut.at] + eps[std::ptrdiff_t(cut.at) - own]);
-        force += mass * slip;
-        total += mass;
-        add_torque<c>(torque, r, mass * slip, 0.0);
-        add_moments<c>(moments, r, mass);
+    const ForcingRate rate(options, dt, flow.options().kinematic_viscosity, carrier.cell);
+    const Vector3d first = carrier.arm(c, 0, 0, 0);
+    const std::uint32_t* at = faces.at.data();
+    const std::int16_t *place_a = faces.place[0].data(), *place_b = faces.place[1].data();
+    const float* fraction = faces.fraction.data();
+    float* weight = faces.weight.data();
+    const int count = int(faces.at.size());
+    double force = 0.0, force_a = 0.0, force_b = 0.0, total = 0.0, total_aa = 0.0, total_ab = 0.0, total_bb = 0.0;
+    const Prefetch<porous> prefetch(us, eps, own);
+    for (int n = 0; n < count; ++n) {
+        if (n + cuts_ahead < count) prefetch.face(at[n + cuts_ahead]);
+        const double ra = first[a] + carrier.cell * place_a[n], rb = first[b] + carrier.cell * place_b[n];
+        const double slip = us[at[n]] - (carrier.velocity[c] + carrier.spin[a] * rb - carrier.spin[b] * ra);
+        weight[n] = float(rate.weight(double(fraction[n]), slip));
+        const double mass = double(weight[n]) * face_void<porous>(eps, own, at[n]);
+        const double f = mass * slip;
+        force += f, force_a += f * ra, force_b += f * rb;
+        total += mass, total_aa += mass * ra * ra, total_ab += mass * ra * rb, total_bb += mass * rb * rb;
     }
     action.force[c] += force;
-    action.torque += torque;
+    action.torque[a] += force_b;
+    action.torque[b] -= force_a;
     action.forced_mass[c] += total;
-    add_inertia<c>(action.forced_inertia, moments);
+    add_inertia<c>(action.forced_inertia, Vector3d(total_bb, total_aa, total_ab));
 }
 
 /// u* <- u* + w (u_s - u*) on the faces of one component. \returns the sum of eps times the change
 template <int c, bool porous>
-double force_faces(Flow& flow, const std::vector<SolidRun>& runs, const std::vector<CutFace>& cuts,
-                   const Carrier& carrier)
+double force_faces(Flow& flow, const OwnFaces& faces, const Carrier& carrier)
 {
+    constexpr int a = (c + 1) % 3, b = (c + 2) % 3;
     double* us = flow.provisional(c).data();
     const double* eps = porous ? flow.porous_fields().void_fraction.data() : nullptr;
     const std::ptrdiff_t own = flow.layout().stride[c];
     const double slope = row_slope<c>(carrier);
     double impulse = 0.0;
-    for (const SolidRun& run : runs) {
-        const double solid = carrier.component_velocity(c, carrier.arm(c, run.i, run.j, run.k));
+    const Prefetch<porous> prefetch(us, eps, own);
+    for (std::size_t n = 0; n < faces.runs.size(); ++n) {
+        prefetch.row(faces.runs, n);
+        const SolidRun& run = faces.runs[n];
+        const double body = carrier.component_velocity(c, carrier.arm(c, run.i, run.j, run.k));
         double* row = us + run.at;
-        impulse += detail::lane_sum(run.length, [&](std::ptrdiff_t l) {
-            const double change = solid + slope * double(l) - row[l];
-            if constexpr (porous) return 0.5 * (eps[run.at + l] + eps[run.at + l - own]) * change;
-            return change;
-        });
-        for (int l = 0; l < run.length; ++l) row[l] = solid + slope * l;
+        const double *high = porous ? eps + run.at : nullptr, *low = porous ? high - own : nullptr;
+        const int length = run.length;
+        double sum = 0.0;
+#pragma omp simd reduction(+ : sum)
+        for (int l = 0; l < length; ++l) {
+            const double solid = body + slope * l;
+            double change = solid - row[l];
+            if constexpr (porous) change *= 0.5 * (high[l] + low[l]);
+            sum += change;
+            row[l] = solid;
+        }
+        impulse += sum;
     }
-    for (const CutFace& cut : cuts) {
-        if (cut.shared) continue;
-        const double solid = carrier.component_velocity(c, carrier.arm(c, cut.i, cut.j, cut.k));
-        const double change = double(cut.weight) * (solid - us[cut.at]);
-        us[cut.at] += change;
-        impulse += (porous ? 0.5 * (eps[cut.at] + eps[std::ptrdiff_t(cut.at) - own]) : 1.0) * change;
+    const Vector3d first = carrier.arm(c, 0, 0, 0);
+    const std::uint32_t* at = faces.at.data();
+    const std::int16_t *place_a = faces.place[0].data(), *place_b = faces.place[1].data();
+    const int count = int(faces.at.size());
+    double sum = 0.0;
+    for (int n = 0; n < count; ++n) {
+        if (n + cuts_ahead < count) prefetch.face(at[n + cuts_ahead]);
+        const double ra = first[a] + carrier.cell * place_a[n], rb = first[b] + carrier.cell * place_b[n];
+        const double solid = carrier.velocity[c] + carrier.spin[a] * rb - carrier.spin[b] * ra;
+        const double change = double(faces.weight[std::size_t(n)]) * (solid - us[at[n]]);
+        us[at[n]] += change;
+        sum += face_void<porous>(eps, own, at[n]) * change;
     }
-    return impulse;
+    return impulse + sum;
+}
+
+/// One for each body.
+template <class Bodies>
+std::vector<Carrier> carriers_of(const GridSpec& grid, const Bodies& bodies, std::span<const RigidMotion> motions)
+{
+    std::vector<Carrier> carriers;
+    carriers.reserve(bodies.size());
+    for (std::size_t b = 0; b < bodies.size(); ++b) carriers.emplace_back(grid, bodies[b]->placed, motions[b]);
+    return carriers;
+}
+
+/// Velocity of the solid on a shared face: mean of the bodies weighted by their fractions.
+template <int c, class Claim>
+double shared_velocity(std::span<const Claim> claims, const std::vector<Carrier>& carriers)
+{
+    double solid = 0.0;
+    for (const Claim& claim : claims) {
+        const Carrier& carrier = carriers[claim.body];
+        solid += claim.part * carrier.component_velocity(c, carrier.arm(c, claim.i, claim.j, claim.k));
+    }
+    return solid;
 }
 
 }  // namespace
 
 /// What the solid rows resist with; it does not change from step to step.
-void ImmersedBodies::weigh()
+void ImmersedBodies::weigh(Body& body) const
 {
-    parallel_blocks(bodies_.size(), 1, [&](std::size_t b, std::size_t) {
-        Body& body = *bodies_[b];
-        const Carrier carrier(grid_, body.placed, body.placed);
-        body.run_mass.setZero();
-        body.run_inertia.setZero();
-        for_each_component([&](auto component) {
-            weigh_runs<component>(body.own_runs[component], carrier, body.run_mass, body.run_inertia);
-        });
+    const Carrier carrier(grid_, body.placed, body.placed);
+    body.run_mass.setZero();
+    body.run_inertia.setZero();
+    for_each_component([&](auto component) {
+        weigh_runs<component>(body.own[component].runs, carrier, body.run_mass, body.run_inertia);
     });
-}
-
-/// Velocity of the solid on a shared face: mean of the bodies weighted by their fractions.
-double ImmersedBodies::shared_velocity(const Shared& shared, std::span<const RigidMotion> motions) const
-{
-    double solid = 0.0;
-    for (const Shared::Share& share : shared.shares) {
-        const Carrier carrier(grid_, bodies_[share.body]->placed, motions[share.body]);
-        solid += share.part *
-                 carrier.component_velocity(shared.component, carrier.arm(shared.component, share.i, share.j, share.k));
-    }
-    return solid;
 }
 
 /// The projection keeps every cell's volume, come what may: where solid fills the whole section, the given inflow goes
@@ -432,40 +412,40 @@ void ImmersedBodies::watch_for_blockage(const Flow& flow, std::span<const Vector
 std::span<const FluidAction> ImmersedBodies::measure(Flow& flow, double dt, std::span<const RigidMotion> motions)
 {
     const Stopwatch watch(flow.times().forcing);
+    const std::vector<Carrier> carriers = carriers_of(grid_, bodies_, motions);
     std::vector<Vector3d> mean_slip(bodies_.size(), Vector3d::Zero());  // over the solid rows
     parallel_blocks(bodies_.size(), 1, [&](std::size_t b, std::size_t) {
         Body& body = *bodies_[b];
-        const Carrier carrier(grid_, body.placed, motions[b]);
+        const Carrier& carrier = carriers[b];
         FluidAction action;
         action.forced_mass = body.run_mass;
         action.forced_inertia = body.run_inertia;
         for_each_component([&](auto component) {
             constexpr int c = component;
             if (flow.porous()) {
-                measure_runs<c, true>(flow, body.own_runs[c], carrier, action);
+                measure_runs<c, true>(flow, body.own[c].runs, carrier, action);
                 mean_slip[b][c] = action.force[c] / std::max(1.0, body.run_mass[c]);
-                measure_cuts<c, true>(flow, options_, dt, body.solid[c].cuts, carrier, action);
+                measure_cuts<c, true>(flow, options_, dt, body.own[c], carrier, action);
             } else {
-                measure_runs<c, false>(flow, body.own_runs[c], carrier, action);
+                measure_runs<c, false>(flow, body.own[c].runs, carrier, action);
                 mean_slip[b][c] = action.force[c] / std::max(1.0, body.run_mass[c]);
-                measure_cuts<c, false>(flow, options_, dt, body.solid[c].cuts, carrier, action);
+                measure_cuts<c, false>(flow, options_, dt, body.own[c], carrier, action);
             }
         });
         actions_[b] = action;
     });
     watch_for_blockage(flow, mean_slip);
-    for (Shared& shared : shared_) {
-        for_each_component([&](auto component) {
-            constexpr int c = component;
-            if (shared.component != c) return;
-            const double slip = flow.provisional(c)[shared.at] - shared_velocity(shared, motions);
-            shared.weight =
-                forcing_weight(options_, shared.fraction, slip, dt, flow.options().kinematic_viscosity, grid_.cell);
-            for (const Shared::Share& share : shared.shares) {
-                const Carrier carrier(grid_, bodies_[share.body]->placed, motions[share.body]);
-                const Vector3d r = carrier.arm(c, share.i, share.j, share.k);
-                const double part = share.part * shared.weight * flow.face_void_fraction(c, shared.at);
-                FluidAction& action = actions_[share.body];
+    const ForcingRate rate(options_, dt, flow.options().kinematic_viscosity, grid_.cell);
+    for_each_component([&](auto component) {
+        constexpr int c = component;
+        for (Shared& shared : shared_[c]) {
+            const std::span<const Claim> claims(claims_[c].data() + shared.first, claims_[c].data() + shared.last);
+            const double slip = flow.provisional(c)[shared.at] - shared_velocity<c>(claims, carriers);
+            shared.weight = rate.weight(shared.fraction, slip);
+            for (const Claim& claim : claims) {
+                const Vector3d r = carriers[claim.body].arm(c, claim.i, claim.j, claim.k);
+                const double part = claim.part * shared.weight * flow.face_void_fraction(c, shared.at);
+                FluidAction& action = actions_[claim.body];
                 Vector3d moments = Vector3d::Zero();
                 action.force[c] += part * slip;
                 action.forced_mass[c] += part;
@@ -473,8 +453,8 @@ std::span<const FluidAction> ImmersedBodies::measure(Flow& flow, double dt, std:
                 add_moments<c>(moments, r, part);
                 add_inertia<c>(action.forced_inertia, moments);
             }
-        });
-    }
+        }
+    });
     const double mass = flow.options().density * grid_.cell_volume();
     for (FluidAction& action : actions_) {
         action.force *= mass / dt;
@@ -489,28 +469,32 @@ void ImmersedBodies::apply(Flow& flow, std::span<const RigidMotion> motions)
 {
     const Stopwatch watch(flow.times().forcing);
     const double mass = flow.options().density * grid_.cell_volume();
+    const std::vector<Carrier> carriers = carriers_of(grid_, bodies_, motions);
     impulses_.resize(bodies_.size());
     Vector3d impulse = parallel_sum(bodies_.size(), 1, Vector3d(0.0, 0.0, 0.0), [&](std::size_t b, std::size_t) {
         const Body& body = *bodies_[b];
-        const Carrier carrier(grid_, body.placed, motions[b]);
+        const Carrier& carrier = carriers[b];
         Vector3d part = Vector3d::Zero();
         for_each_component([&](auto component) {
             constexpr int c = component;
-            part[c] = flow.porous() ? force_faces<c, true>(flow, body.own_runs[c], body.solid[c].cuts, carrier)
-                                    : force_faces<c, false>(flow, body.own_runs[c], body.solid[c].cuts, carrier);
+            part[c] = flow.porous() ? force_faces<c, true>(flow, body.own[c], carrier)
+                                    : force_faces<c, false>(flow, body.own[c], carrier);
         });
         impulses_[b] = mass * part;
         return part;
     });
-    for (const Shared& shared : shared_) {
-        const int c = shared.component;
-        double& us = flow.provisional(c)[shared.at];
-        const double change = shared.weight * (shared_velocity(shared, motions) - us);
-        us += change;
-        const double given = flow.face_void_fraction(c, shared.at) * change;
-        impulse[c] += given;
-        for (const Shared::Share& share : shared.shares) impulses_[share.body][c] += mass * share.part * given;
-    }
+    for_each_component([&](auto component) {
+        constexpr int c = component;
+        for (const Shared& shared : shared_[c]) {
+            const std::span<const Claim> claims(claims_[c].data() + shared.first, claims_[c].data() + shared.last);
+            double& us = flow.provisional(c)[shared.at];
+            const double change = shared.weight * (shared_velocity<c>(claims, carriers) - us);
+            us += change;
+            const double given = flow.face_void_fraction(c, shared.at) * change;
+            impulse[c] += given;
+            for (const Claim& claim : claims) impulses_[claim.body][c] += mass * claim.part * given;
+        }
+    });
     flow.add_forcing_impulse(mass * impulse);
 }
 

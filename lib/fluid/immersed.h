@@ -95,8 +95,6 @@ public:
 
     /// Solid fraction of cells, overlaps clipped at 1, padded like a field of the flow, ghosts 0.
     const Field& cell_solid_fraction() const { return cell_solid_; }
-    /// Solid fraction of faces of a component, overlaps clipped at 1.
-    const Field& face_solid_fraction(int axis) const { return face_solid_[axis]; }
     /// Volume of a body as the cells of the domain see it [m3].
     double seen_volume(std::size_t body) const;
     /// Counts place() calls that changed anything.
@@ -109,23 +107,27 @@ public:
 
 private:
     struct Body;    // faces of one body
-    struct Shared;  // a face on which several bodies meet
+    struct Claim;   // one of several bodies on a face
+    struct Shared;  // such a face
+    struct Change;  // what a body that moved covers now
 
-    void rasterise(Body& body) const;
-    void merge();
-    void weigh();
+    Change rasterise(std::size_t body) const;
+    void merge(std::vector<Change>& changes);
+    void find_own(Body& body, int component);
+    void find_shared(int component, std::span<const std::size_t> bodies);
+    void weigh(Body& body) const;
     void watch_for_blockage(const Flow& flow, std::span<const Eigen::Vector3d> slip);
-    double shared_velocity(const Shared& shared, std::span<const RigidMotion> motions) const;
 
     GridSpec grid_;
     Layout layout_;
     ForcingOptions options_;
     std::vector<std::unique_ptr<Body>> bodies_;
-    std::vector<Shared> shared_;
+    std::array<std::vector<Claim>, 3> claims_;   // of each component, by face and body
+    std::array<std::vector<Shared>, 3> shared_;  // of each component
     std::vector<FluidAction> actions_;
     std::vector<int> driven_steps_;  ///< of each body: steps in a row in which the flow was driven through it
     std::vector<Eigen::Vector3d> impulses_;
-    std::array<Field, 3> face_solid_;
+    std::array<Field, 4> solid_sum_;  // of all bodies' fractions, on the faces of each component and in cells
     Field cell_solid_;
     std::uint64_t version_ = 0;
 };

@@ -123,40 +123,57 @@ double solid_fraction(const std::array<double, 8>& distances, double shift)
     return all > 0.0 ? solid / all : 0.0;
 }
 
-/// `part` of what the mean distance of the corners is above the distance of the middle, for each volume: near a surface
-/// of principal radii R1, R2 that difference is about h2 (1/R1 + 1/R2)/8.
-std::vector<double> corner_excess(const Corners& c, const std::vector<Vector3i>& volumes, const BodyShape& shape,
-                                  const RigidMotion& motion, double part)
-{
-    const Eigen::Matrix3d to_body = motion.orientation.conjugate().toRotationMatrix();
-    std::vector<Vector3d> middles;
-    for (const Vector3i& v : volumes)
-        middles.push_back(
-            to_body * (c.origin + c.spacing * (v.cast<double>() + Vector3d::Constant(0.5)) - motion.position));
-    std::vector<double> excess(volumes.size());
-    shape.distance(middles, excess);
-    for (std::size_t v = 0; v < volumes.size(); ++v) {
-        double mean = 0.0;
-        for (const double d : corner_distances(c, volumes[v].x(), volumes[v].y(), volumes[v].z())) mean += 0.125 * d;
-        excess[v] = part * (mean - excess[v]);
-    }
-    return excess;
-}
+/// A volume with solid in it, counted from the first, x fastest.
+struct Volume {
+    Vector3i at;
+    bool near;  ///< the surface cuts it, or would if it lay a quarter of a cell off
+};
 
-/// Volumes that the surface cuts, or would cut if it lay a quarter of a cell off; x fastest, counted from the first.
-std::vector<Vector3i> volumes_near_surface(const Corners& c)
+std::vector<Volume> volumes_with_solid(const Corners& c)
 {
     const double near = 0.25 * c.spacing;
     const Vector3i count = c.high - c.low;
-    std::vector<Vector3i> found;
+    std::vector<Volume> found;
+    std::vector<double> lowest(std::size_t(c.points.x())), highest(lowest);  // of the four rows of corners around a row
     for (int k = 0; k < count.z(); ++k)
-        for (int j = 0; j < count.y(); ++j)
-            for (int i = 0; i < count.x(); ++i) {
-                const std::array<double, 8> d = corner_distances(c, i, j, k);
-                const auto [low, high] = std::minmax_element(d.begin(), d.end());
-                if (*low < near && *high > -near) found.emplace_back(i, j, k);
+        for (int j = 0; j < count.y(); ++j) {
+            const double *a = &c.distance[c.index(0, j, k)], *b = &c.distance[c.index(0, j + 1, k)],
+                         *d = &c.distance[c.index(0, j, k + 1)], *e = &c.distance[c.index(0, j + 1, k + 1)];
+            for (std::size_t i = 0; i < lowest.size(); ++i) {
+                lowest[i] = std::min(std::min(a[i], b[i]), std::min(d[i], e[i]));
+                highest[i] = std::max(std::max(a[i], b[i]), std::max(d[i], e[i]));
             }
+            for (int i = 0; i < count.x(); ++i) {
+                const auto n = std::size_t(i);
+                if (std::min(lowest[n], lowest[n + 1]) >= near) continue;
+                found.push_back({Vector3i(i, j, k), std::max(highest[n], highest[n + 1]) > -near});
+            }
+        }
     return found;
+}
+
+/// Distance at the middle of the volumes near the surface.
+std::vector<double> middle_distances(const Corners& c, const std::vector<Volume>& volumes, const BodyShape& shape,
+                                     const RigidMotion& motion)
+{
+    const Eigen::Matrix3d to_body = motion.orientation.conjugate().toRotationMatrix();
+    std::vector<Vector3d> middles;
+    for (const Volume& v : volumes)
+        if (v.near)
+            middles.push_back(
+                to_body * (c.origin + c.spacing * (v.at.cast<double>() + Vector3d::Constant(0.5)) - motion.position));
+    std::vector<double> distances(middles.size());
+    shape.distance(middles, distances);
+    return distances;
+}
+
+/// What the mean distance of the corners is above the distance of the middle: near a surface of principal radii R1, R2
+/// about h2 (1/R1 + 1/R2)/8.
+double corner_excess(const std::array<double, 8>& corners, double middle)
+{
+    double mean = 0.0;
+    for (const double d : corners) mean += 0.125 * d;
+    return mean - middle;
 }
 
 void add_solid(SolidSet& set, std::uint32_t at, const Vector3i& v)
@@ -188,28 +205,29 @@ SolidSet find_solid(const GridSpec& grid, const Layout& layout, int component, c
     SolidSet set;
     Corners c = corners_of(grid, component, shape, motion);
     if (c.empty()) return set;
+    set.low = c.low, set.high = c.high;
     sample(c, shape, motion);
-    const std::vector<Vector3i> near =
-        rule == FractionRule::curved ? volumes_near_surface(c) : std::vector<Vector3i>{};
-    const std::vector<double> excess =
-        corner_excess(c, near, shape, motion, component == cells_component ? volume_part : face_part);
+    const double part = rule == FractionRule::corners ? 0.0 : component == cells_component ? volume_part : face_part;
+    const std::vector<Volume> volumes = volumes_with_solid(c);
+    const std::vector<double> middles =
+        part > 0.0 ? middle_distances(c, volumes, shape, motion) : std::vector<double>{};
     const auto wrapped = [&](int i, int d) { return grid.periodic(d) ? wrap(i, grid.cells[d]) : i; };
-    const Vector3i count = c.high - c.low;
     std::size_t next = 0;
-    for (int k = 0; k < count.z(); ++k)
-        for (int j = 0; j < count.y(); ++j)
-            for (int i = 0; i < count.x(); ++i) {
-                const Vector3i v = c.low + Vector3i(i, j, k);
-                const bool is_near = next < near.size() && near[next] == Vector3i(i, j, k);
-                const double phi = solid_fraction(corner_distances(c, i, j, k), is_near ? excess[next++] : 0.0);
-                if (phi < negligible) continue;
-                const auto at = std::uint32_t(layout.index(wrapped(v.x(), 0), wrapped(v.y(), 1), wrapped(v.z(), 2)));
-                if (phi < 1.0 - negligible)
-                    set.cuts.push_back({at, std::int16_t(v.x()), std::int16_t(v.y()), std::int16_t(v.z()), false,
-                                        float(phi), 0.0F});
-                else
-                    add_solid(set, at, v);
-            }
+    for (const Volume& volume : volumes) {
+        double phi = 1.0;
+        if (volume.near) {
+            const std::array<double, 8> corners =
+                corner_distances(c, volume.at.x(), volume.at.y(), volume.at.z());
+            phi = solid_fraction(corners, part > 0.0 ? part * corner_excess(corners, middles[next++]) : 0.0);
+        }
+        if (phi < negligible) continue;
+        const Vector3i v = c.low + volume.at;
+        const auto at = std::uint32_t(layout.index(wrapped(v.x(), 0), wrapped(v.y(), 1), wrapped(v.z(), 2)));
+        if (phi < 1.0 - negligible)
+            set.cuts.push_back({at, std::int16_t(v.x()), std::int16_t(v.y()), std::int16_t(v.z()), float(phi)});
+        else
+            add_solid(set, at, v);
+    }
     return set;
 }
 

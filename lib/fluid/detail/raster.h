@@ -19,14 +19,13 @@ struct SolidRun {
 struct CutFace {
     std::uint32_t at = 0;
     std::int16_t i = 0, j = 0, k = 0;
-    bool shared = false;  ///< another body is here too; then ImmersedBodies::Shared has it
-    float fraction = 0.0F;
-    float weight = 0.0F;  ///< w of the last measure()
+    float fraction = 0.0F;             ///< at least 1e-6
 };
 
 struct SolidSet {
     std::vector<SolidRun> runs;
     std::vector<CutFace> cuts;
+    Eigen::Vector3i low = Eigen::Vector3i::Zero(), high = Eigen::Vector3i::Zero();  ///< box around them, [low, high)
 };
 
 inline constexpr int cells_component = 3;
