@@ -6,6 +6,10 @@
 #include <spdlog/spdlog.h>
 #include <toml++/toml.h>
 
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
+
 #include <csignal>
 #include <filesystem>
 #include <new>
@@ -181,11 +185,21 @@ int report(const std::string& tool, const std::string& message, int code)
     return code;
 }
 
+/// Arrays of megabytes go back to the system when they are freed. The C library would keep those that it has once seen freed: a third of
+/// what a coupled run holds.
+void return_large_memory()
+{
+#ifdef __GLIBC__
+    mallopt(M_MMAP_THRESHOLD, 4 << 20);
+#endif
+}
+
 }  // namespace
 
 int run_tool(int argc, char** argv, const std::string& name, const std::string& description,
              const std::function<void(Options&)>& declare, const std::function<void(const Context&)>& run, std::uint64_t* seed)
 {
+    return_large_memory();
     CLI::App app(description, name);
     app.option_defaults()->always_capture_default();
     CommonOptions common;

@@ -257,7 +257,8 @@ ShapeTemplate load_shape(const Population& p, std::int64_t id, double reach)
         closed(grain.solid, "its level set is solid at the border of its lattice, or nowhere");
         closed(grain.apparent, "its filled level set is solid at the border of its lattice, or nowhere");
         shape.grid = std::make_shared<sdf::DistanceGrid>(sdf::extended(grain.solid, reach));
-        shape.apparent_grid = std::make_shared<sdf::DistanceGrid>(std::move(grain.apparent));
+        constexpr int margin = 2;  // it tells inside from outside: distances out there are half of its memory
+        shape.apparent_grid = std::make_shared<sdf::DistanceGrid>(sdf::trimmed(grain.apparent, margin));
         shape.volume = grain.volume;
         shape.apparent_volume = grain.apparent_volume;
         shape.equivalent_diameter = grain.equivalent_diameter;

@@ -72,4 +72,32 @@ DistanceGrid extended(const DistanceGrid& grid, double outside_distance)
     return result;
 }
 
+DistanceGrid trimmed(const DistanceGrid& grid, int margin)
+{
+    Eigen::Vector3i low = grid.size, high = Eigen::Vector3i::Constant(-1);
+    for (int k = 0; k < grid.size.z(); ++k)
+        for (int j = 0; j < grid.size.y(); ++j)
+            for (int i = 0; i < grid.size.x(); ++i) {
+                if (grid.distance[grid.index(i, j, k)] > 0) continue;
+                low = low.cwiseMin(Eigen::Vector3i(i, j, k));
+                high = high.cwiseMax(Eigen::Vector3i(i, j, k));
+            }
+    if (high.x() < 0) return grid;
+    low = (low.array() - margin).max(0);
+    high = (high.array() + margin).min(grid.size.array() - 1);
+    DistanceGrid part;
+    part.spacing = grid.spacing;
+    part.outside_limit = grid.outside_limit;
+    part.inside_limit = grid.inside_limit;
+    part.size = high - low + Eigen::Vector3i::Ones();
+    part.origin = grid.node(low.x(), low.y(), low.z());
+    part.distance.reserve(part.node_count());
+    for (int k = low.z(); k <= high.z(); ++k)
+        for (int j = low.y(); j <= high.y(); ++j) {
+            const auto row = grid.distance.begin() + std::ptrdiff_t(grid.index(low.x(), j, k));
+            part.distance.insert(part.distance.end(), row, row + part.size.x());
+        }
+    return part;
+}
+
 }  // namespace coral::sdf

@@ -1,6 +1,6 @@
 #pragma once
 /// \file sdf/extend.h
-/// Exact extension of a narrow-band grid, so that no clamped value is ever taken for a distance.
+/// How far a lattice reaches: exact extension of a narrow band, so that no clamped value is ever taken for a distance, and its opposite.
 #include "sdf/distance_grid.h"
 
 namespace coral::sdf {
@@ -13,5 +13,9 @@ namespace coral::sdf {
 /// \param outside_distance  [m]; a smaller one than the grid already has leaves the box as it is
 /// \throws Error when the band is narrower than 2 nodes
 DistanceGrid extended(const DistanceGrid& grid, double outside_distance);
+
+/// The part of the lattice around the solid, with `margin` positive nodes on each side where the lattice has them (at least 1).
+/// The surface stays as it is; distances farther outside go. A grid without solid stays whole.
+DistanceGrid trimmed(const DistanceGrid& grid, int margin);
 
 }  // namespace coral::sdf

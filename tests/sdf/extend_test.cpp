@@ -76,4 +76,23 @@ TEST(Extended, refuses_a_band_too_narrow_for_its_surface)
 }
 
 }  // namespace
+TEST(Trimmed, keeps_the_surface_and_the_margin)
+{
+    const double radius = 6.3, h = 1.0;
+    const auto distance = [&](const Eigen::Vector3d& x) { return (x - Eigen::Vector3d(1.2, -0.4, 0.1)).norm() - radius; };
+    const DistanceGrid wide = tabulated(distance, {-12, -13, -14}, {25, 27, 29}, h);
+    const DistanceGrid part = trimmed(wide, 2);
+    EXPECT_LT(part.node_count(), wide.node_count() / 4);
+    for (int k = 0; k < wide.size.z(); ++k)
+        for (int j = 0; j < wide.size.y(); ++j)
+            for (int i = 0; i < wide.size.x(); ++i) {
+                const Eigen::Vector3d x = wide.node(i, j, k);
+                if (distance(x) > 2.0 / std::sqrt(3.0)) continue;
+                ASSERT_TRUE(part.inside_box(x));
+                EXPECT_EQ(part.sample(x), wide.sample(x));
+            }
+    for (const float border : {part.distance.front(), part.distance.back()}) EXPECT_GT(border, 0.0f);
+    EXPECT_EQ(trimmed(part, 2).size, part.size);
+}
+
 }  // namespace coral::sdf::test
