@@ -32,7 +32,7 @@ void declare(coral::cli::Options& options, Options& o)
     options.add("--lid", o.lid, "Upper wall of the packing: keep (holds the grains, water passes), or remove (a compressed sample springs up)").one_of({"keep", "remove"});
     options.quantity("--duration", o.plan.duration, Dimension::time, "Length of the run");
     options.add("--engine", o.engine, "Flow solver: embedded or openfoam");
-    options.flag("--explain", o.explain, "Print the plan only");
+    options.flag("--explain", o.explain, "Print the plan and the errors to expect, and write nothing");
 }
 
 nlohmann::ordered_json json_plan(const coral::suffusion::Plan& plan)
@@ -71,6 +71,7 @@ void run(const Options& o, const coral::cli::Context& context)
     wanted.lid = o.lid == "keep";
     const suffusion::Plan plan = suffusion::make_plan(sample, wanted);
     std::string human = suffusion::explain(plan);
+    if (o.explain) human += suffusion::explain_accuracy(plan, sample);
     if (!o.explain) {
         const fs::path folder = o.output;
         std::error_code failed;

@@ -53,6 +53,9 @@ Plan make_plan(const pack::Sample& sample, const PlanOptions& options);
 /// The plan in words, a line a fact.
 std::string explain(const Plan& plan);
 
+/// What flow and contact of this case may be wrong by, by measured cases like it; several lines.
+std::string explain_accuracy(const Plan& plan, const pack::Sample& sample);
+
 /// Complete, commented case.toml; the sample lies beside it under `sample_file`.
 std::string case_text(const Plan& plan, const pack::Sample& sample, const std::string& sample_file);
 

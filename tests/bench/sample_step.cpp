@@ -1,7 +1,8 @@
-// Cost of a contact step of a packed sample, phase by phase: sample_step SAMPLE.h5 [steps] [threads].
+// Cost of a contact step of a packed sample, phase by phase: sample_step SAMPLE.h5 [steps] [threads] [automatic|nearest|walls].
 #include <cstdio>
 #include <cstdlib>
 #include <ctime>
+#include <string_view>
 
 #include "core/parallel.h"
 #include "pack/sample.h"
@@ -11,7 +12,7 @@ int main(int count, char** values)
 {
     using namespace coral;
     if (count < 2) {
-        std::fputs("sample_step SAMPLE.h5 [steps] [threads]\n", stderr);
+        std::fputs("sample_step SAMPLE.h5 [steps] [threads] [automatic|nearest|walls]\n", stderr);
         return 1;
     }
     const int steps = count > 2 ? std::atoi(values[2]) : 2000;
@@ -19,6 +20,8 @@ int main(int count, char** values)
     const pack::Sample sample = pack::read_sample(values[1]);
     dem::WorldOptions options;
     options.gravity = sample.gravity;
+    const std::string_view scheme = count > 4 ? values[4] : "automatic";
+    options.sphere_scheme = scheme == "walls" ? dem::SphereScheme::walls : scheme == "nearest" ? dem::SphereScheme::nearest : dem::SphereScheme::automatic;
     dem::World world(options);
     const pack::SampleIds ids = pack::add_sample(world, sample);
     pack::restore_springs(world, sample, ids);

@@ -38,7 +38,8 @@ struct Spread {
     }
 };
 
-const char* name(SphereScheme s) { return s == SphereScheme::walls ? "walls" : "nearest"; }
+constexpr SphereScheme schemes[] = {SphereScheme::nearest, SphereScheme::automatic, SphereScheme::walls};
+const char* name(SphereScheme s) { return s == SphereScheme::walls ? "walls" : s == SphereScheme::nearest ? "nearest" : "automatic"; }
 
 void throats()
 {
@@ -46,7 +47,7 @@ void throats()
     std::printf("%8s %8s %10s %30s %30s %30s\n", "radius", "spacing", "scheme", "on the axis", "h/4 off the axis", "half way to the wall");
     for (const double rho : {0.5e-3, 1e-3, 1.5e-3})
         for (const double h : {2e-4, 1e-4, 5e-5})
-            for (const SphereScheme scheme : {SphereScheme::nearest, SphereScheme::walls}) {
+            for (const SphereScheme scheme : schemes) {
                 std::mt19937_64 random(3);
                 std::uniform_real_distribution<double> u(-0.5, 0.5);
                 Spread axis, near, middle;
@@ -73,7 +74,7 @@ void grooves()
     std::printf("\nGroove of 60 degrees, sphere of 2 mm under 1000 g: height of rest above the true one, overlap at rest against the true 0.571 um\n");
     std::printf("%8s %10s %22s %16s %14s %16s %18s\n", "spacing", "scheme", "axis", "height [um]", "overlap [um]", "speed [m/s]", "friction slots");
     for (const double h : {2e-4, 1e-4, 5e-5})
-        for (const SphereScheme scheme : {SphereScheme::nearest, SphereScheme::walls})
+        for (const SphereScheme scheme : schemes)
             for (int axis = 0; axis < 3; ++axis) {
                 // The lattice of tabulate() has nodes at -half - 0.37 h + k h; half = 4 mm is a multiple of all three spacings.
                 const Vec3 shift = axis == 0 ? Vec3(-0.37 * h, 0, -1.5e-3) : Vec3(0.08 * h, 0, -1.5e-3);
@@ -121,7 +122,7 @@ void bounces()
     std::printf("\nUndamped bouncing for 0.1 s, 200 um: relative error of the energy out of contact, 8 starts (3 at the short step): mean of the last, greatest at any time; cost\n");
     std::printf("%22s %10s %10s %12s %12s %12s %12s\n", "cavity", "scheme", "step [s]", "mean", "greatest", "us/step", "explodes");
     for (const Cavity& c : cavities())
-        for (const SphereScheme scheme : {SphereScheme::nearest, SphereScheme::walls})
+        for (const SphereScheme scheme : schemes)
             for (const double dt : {2e-6, 5e-7}) {
                 const auto shape = carved(c.distance, c.half, 2e-4);
                 const int starts = dt > 1e-6 ? 8 : 3;
@@ -169,7 +170,7 @@ void costs()
     std::printf("%8s %10s %14s %14s %14s %14s %12s\n", "spacing", "scheme", "gap 0.1 mm", "overlap 2 um", "overlap 10 um", "overlap 50 um", "surface [MB]");
     for (const double h : {2e-4, 1e-4, 5e-5}) {
         const auto grain = grid_ball(7.5e-3, h, 1000, 1.3e-3);
-        for (const SphereScheme scheme : {SphereScheme::nearest, SphereScheme::walls}) {
+        for (const SphereScheme scheme : schemes) {
             std::printf("%8.0f %10s", 1e6 * h, name(scheme));
             for (const double overlap : {-1e-4, 2e-6, 1e-5, 5e-5}) {
                 World world = cavity_world(grain, scheme);

@@ -130,7 +130,7 @@ TEST(MakeCase, explain_prints_the_plan_and_writes_nothing)
     pack::write_sample(small_sample(true), folder.path() / "sample.h5");
     const ProgramResult plan = run_program("make-case sample.h5 -o case --explain", folder.path());
     ASSERT_EQ(plan.exit_code, 0) << plan.err;
-    for (const char* word : {"domain", "coarse", "fine", "steps", "memory", "time"}) EXPECT_NE(plan.out.find(word), std::string::npos) << word;
+    for (const char* word : {"domain", "coarse", "fine", "steps", "memory", "time", "expected errors"}) EXPECT_NE(plan.out.find(word), std::string::npos) << word;
     EXPECT_FALSE(fs::exists(folder.path() / "case"));
 }
 
