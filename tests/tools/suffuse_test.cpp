@@ -117,6 +117,36 @@ TEST(Suffuse, erosion_never_decreases_and_both_balances_close)
     EXPECT_TRUE(results.exists("/performance/milliseconds_per_flow_step"));
 }
 
+TEST(Suffuse, stops_where_the_way_of_the_inlet_is_blocked)
+{
+    const ScratchFolder folder;
+    write_text(folder.path() / "case.toml", R"(
+[domain]
+size = ["8mm", "8mm", "20mm"]
+cell = "1mm"
+[boundary]
+"z+" = { type = "inlet", velocity = [0, 0, -0.1] }
+"z-" = { type = "outlet", pressure = 0 }
+[fluid]
+kinematic_viscosity = 1e-6
+[[body]]
+shape = { type = "sphere", diameter = "13mm" }
+position = ["4mm", "4mm", "8mm"]
+motion = "fixed"
+role = "coarse"
+[output]
+interval = "20ms"
+[time]
+duration = "1s"
+)");
+    const ProgramResult run = run_program("suffuse . --quiet", folder.path());
+    EXPECT_EQ(run.exit_code, 1);
+    EXPECT_NE(run.err.find("its way from the inlet is blocked"), std::string::npos) << run.err;
+    EXPECT_NE(run.err.find("open a way to the outlet"), std::string::npos) << run.err;
+    EXPECT_TRUE(fs::exists(folder.path() / "checkpoint.h5")) << "nothing is left to look at";
+    EXPECT_GT(H5File::open(folder.path() / "results.h5").read_doubles("/series/time").size(), 1u);
+}
+
 TEST(Suffuse, gives_the_same_bytes_for_one_and_two_threads)
 {
     const ScratchFolder folder;
