@@ -5,6 +5,7 @@
 /// four-point kernel [Huang et al., eq. 15, with 4 r^2 for the printed 4 r^4], R the support radius. Cells beyond a
 /// wall are folded back by reflection, cells in resolved grains (phi_c) take no part, and the weights of each particle
 /// sum to 1.
+#include <array>
 #include <span>
 #include <vector>
 
@@ -93,18 +94,25 @@ public:
 private:
     /// Neighbouring cells (or blocks) along x, of one particle.
     struct Row {
-        std::uint32_t start = 0;  // linear index of the first
-        std::int32_t plane = 0;   // k
-        std::int32_t length = 0;
+        std::uint32_t start = 0;            // linear index of the first
+        std::int16_t x = 0, y = 0, z = 0;   // of the first
+        std::int16_t length = 0;
+        /// Weights that a row takes: whole registers. Those beyond its length are zero, for cells beyond the side.
+        int lanes() const { return (length + 3) & ~3; }
     };
     /// Weights of a chunk of particles, one after the other.
     struct Weights {
         std::vector<Row> rows;
-        std::vector<double> values;
+        std::vector<double> values;  // in use up to the end of the last row
+        std::size_t used = 0;
         std::vector<std::size_t> first_row, first_value;  // per particle, one past the end last
         std::vector<std::int32_t> low_plane, high_plane;  // per particle
+
+        void clear();
+        double* append(const Row& row);
     };
-    /// Grid the weights refer to: the padded cells of the flow, or blocks of cells.
+    /// Grid the weights refer to: the padded cells of the flow, or blocks of cells. Either has room for three more
+    /// values at the end of a row.
     struct Target {
         Eigen::Vector3i cells = Eigen::Vector3i::Zero();
         double cell = 0.0;
@@ -112,8 +120,6 @@ private:
         std::ptrdiff_t offset = 0;
         std::size_t total = 0;
     };
-    using Quads = Field;  // four values per cell: volume and flux, coefficient and force, ...
-
     void sort_particles(std::span<const Eigen::Vector3d> positions);
     void choose_blocks(std::span<const double> diameters);
     double cells_in_block(int i, int j, int k) const;
@@ -125,17 +131,23 @@ private:
     void add_row(Weights& weights, const Target& target, const Field* open, double radius, double x, double squared,
                  int j, int k) const;
     template <class Value>
-    void scatter(const std::vector<Weights>& chunks, const Target& target, Quads& quads, const Value& value) const;
-    template <class Value>
-    void gather(const std::vector<Weights>& chunks, const Value& value, std::span<Eigen::Vector4d> sums) const;
-    void deposit_flux(int axis, Field& flux) const;
+    void scatter(const std::vector<Weights>& chunks, const Target& target, std::span<Field, 4> fields,
+                 const Value& value) const;
+    template <std::size_t count>
+    void gather(const std::vector<Weights>& chunks, std::span<const Field, count> fields,
+                std::vector<Eigen::Matrix<double, int(count), 1>>& sums) const;
+    void find_void_fraction();
+    void deposit_flux(int axis, int k, Field& flux) const;
     void find_own_overlap();
     void gather_pressure_gradient(const Flow& flow, std::span<FeltFlow> felt) const;
-    void gather_wide_pressure_gradient(const Flow& flow, std::span<FeltFlow> felt) const;
     double support_radius(double diameter) const;
-    template <class Fill>
-    void average_blocks(Quads& quads, const Fill& fill) const;
-    void cell_row(const Quads& block_values, int j, int k, double* row) const;
+    template <std::size_t count, class Fill>
+    void average_blocks(std::span<Field, count> averages, const Fill& fill) const;
+    void cell_row(const Field& blocks, int j, int k, double* row) const;
+    std::size_t block_row(int j, int k) const
+    {
+        return std::size_t((k / block_) * blocks_.stride[2] + (j / block_) * blocks_.stride[1]);
+    }
 
     GridSpec grid_;
     Layout layout_;
@@ -148,12 +160,17 @@ private:
     std::vector<double> own_overlap_;  // sum_c w_ic (volume) w_ic (felt): solid fraction felt of itself, per h3
     std::vector<double> own_solid_;    // the same times its volume / h3
     std::vector<double> radius_;       // of the felt support [m]
-    Field open_cells_, open_blocks_;  // 1 - phi per cell (padded); its sum per block
-    Field void_fraction_;             // of the next step; changes places with the flow's
-    Field clip_;                      // (1 - eps)/(raw solid fraction); empty when nothing is clipped
-    Quads cell_quads_;
-    mutable Quads block_quads_;
-    mutable std::vector<Eigen::Vector4d> sums_;
+    Field open_cells_, open_blocks_;   // 1 - phi per cell (padded); its sum per block
+    Field share_;                      // of the block that a cell makes up: open / sum of open, all alike in a solid block
+    Field void_fraction_;              // of the next step; changes places with the flow's
+    Field clip_;                       // (1 - eps)/(raw solid fraction)
+    std::vector<char> clipped_;        // rows in which it is not 1
+    bool any_clipped_ = false;
+    std::array<Field, 4> cell_fields_;           // solid fraction and solid flux
+    mutable std::array<Field, 7> block_fields_;  // means, or sums of drag coefficient and force
+    mutable std::vector<Eigen::Matrix<double, 7, 1>> felt_sums_;
+    mutable std::vector<Eigen::Vector4d> plain_sums_;
+    mutable std::vector<Eigen::Vector3d> lag_sums_;
     std::array<std::vector<double>, 3> low_share_,
         high_share_;  // per axis: how a cell's reaction divides between its two faces
 };

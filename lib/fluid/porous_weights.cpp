@@ -8,6 +8,7 @@
 
 #include "core/parallel.h"
 #include "fluid/detail/fines.h"
+#include "fluid/detail/lanes.h"
 
 namespace coral::fluid {
 
@@ -19,6 +20,8 @@ namespace {
 using detail::particles_per_chunk;
 using detail::planes_per_slab;
 using detail::wrap;
+
+using Lanes = Eigen::Array4d;
 
 /// Cell that a position beyond the walls at 0 and n mirrors to.
 int fold(int i, int n)
@@ -33,18 +36,32 @@ class KernelTable {
 public:
     KernelTable()
     {
-        for (int i = 0; i <= entries + 1; ++i) values_[std::size_t(i)] = peskin_kernel(std::sqrt(4.0 * i / entries));
+        const auto value = [](int i) { return peskin_kernel(std::sqrt(4.0 * i / entries)); };
+        for (int i = 0; i <= entries; ++i) steps_[std::size_t(i)] = {value(i), value(i + 1) - value(i)};
     }
     double operator()(double r_squared) const
     {
         const double position = std::min(r_squared * (entries / 4.0), double(entries));
         const int i = int(position);
-        return values_[std::size_t(i)] + (position - i) * (values_[std::size_t(i) + 1] - values_[std::size_t(i)]);
+        const Step& step = steps_[std::size_t(i)];
+        return step.value + (position - i) * step.growth;
+    }
+    Lanes operator()(const Lanes& r_squared) const
+    {
+        const Lanes position = (r_squared * (entries / 4.0)).min(double(entries));
+        const Eigen::Array4i i = position.cast<int>();
+        const Step *a = &steps_[std::size_t(i[0])], *b = &steps_[std::size_t(i[1])], *c = &steps_[std::size_t(i[2])],
+                   *d = &steps_[std::size_t(i[3])];
+        return Lanes(a->value, b->value, c->value, d->value) +
+               (position - i.cast<double>()) * Lanes(a->growth, b->growth, c->growth, d->growth);
     }
 
 private:
     static constexpr int entries = 1024;
-    std::array<double, entries + 2> values_{};
+    struct Step {
+        double value, growth;
+    };
+    std::array<Step, entries + 1> steps_{};
 };
 const KernelTable kernel_table;
 
@@ -88,14 +105,35 @@ FineCoupling::FineCoupling(const GridSpec& grid, const KernelOptions& options)
     }
     void_fraction_ = layout_.make_field(1.0);
     open_cells_ = layout_.make_field(1.0);
+    share_ = layout_.make_field(0.0);
+    clip_ = layout_.make_field(1.0);
+    clipped_.assign(std::size_t(grid.cells.y()) * std::size_t(grid.cells.z()), 0);
 }
 
 std::size_t FineCoupling::stored_weights() const
 {
     std::size_t sum = 0;
     for (const auto* chunks : {&volume_, &felt_})
-        for (const Weights& w : *chunks) sum += w.values.size();
+        for (const Weights& w : *chunks)
+            for (const Row& row : w.rows) sum += std::size_t(row.length);
     return sum;
+}
+
+void FineCoupling::Weights::clear()
+{
+    rows.clear(), low_plane.clear(), high_plane.clear();
+    first_row.assign(1, 0), first_value.assign(1, 0);
+    used = 0;
+}
+
+/// Room for the weights of a row, not yet set.
+double* FineCoupling::Weights::append(const Row& row)
+{
+    rows.push_back(row);
+    const std::size_t first = used;
+    used += std::size_t(row.lanes());
+    if (used > values.size()) values.resize(2 * used);
+    return values.data() + first;
 }
 
 /// Largest block that leaves about 1.5 blocks per smallest diameter: the felt averages do not change by it. Blocks divide
@@ -103,6 +141,7 @@ std::size_t FineCoupling::stored_weights() const
 void FineCoupling::choose_blocks(std::span<const double> diameters)
 {
     constexpr double blocks_per_diameter = 1.4;
+    const int before = block_;
     block_ = std::max(options_.coupling_cells, 1);
     if (options_.coupling_cells <= 0) {
         double smallest = 4.0 * blocks_per_diameter * grid_.cell;  // no more than 4 cells
@@ -113,9 +152,13 @@ void FineCoupling::choose_blocks(std::span<const double> diameters)
     while (block_ > 1 && !(divides(0) && divides(1) && divides(2))) --block_;
     blocks_.cells = (grid_.cells.array() + block_ - 1) / block_;
     blocks_.cell = grid_.cell * block_;
-    blocks_.stride = {1, blocks_.cells.x(), std::ptrdiff_t(blocks_.cells.x()) * blocks_.cells.y()};
+    const std::ptrdiff_t pitch = blocks_.cells.x() + 3;
+    blocks_.stride = {1, pitch, pitch * blocks_.cells.y()};
     blocks_.offset = 0;
     blocks_.total = std::size_t(blocks_.stride[2]) * std::size_t(blocks_.cells.z());
+    if (block_ == before && open_blocks_.size() == blocks_.total) return;
+    open_blocks_.assign(blocks_.total, 0.0);  // to be found anew
+    std::fill(open_cells_.begin(), open_cells_.end(), -1.0);
 }
 
 double FineCoupling::cells_in_block(int i, int j, int k) const
@@ -124,22 +167,50 @@ double FineCoupling::cells_in_block(int i, int j, int k) const
     return double((grid_.cells - first).cwiseMin(Vector3i::Constant(block_)).prod());
 }
 
+/// How open cells and blocks are; planes of blocks in which no grain has moved since the last step are left as they are.
 void FineCoupling::find_open(const Field* cell_solid)
 {
-    open_blocks_.resize(blocks_.total);
-    parallel_blocks(std::size_t(blocks_.cells.z()), planes_per_slab, [&](std::size_t begin, std::size_t end) {
-        const auto first = open_blocks_.begin() + std::ptrdiff_t(begin) * blocks_.stride[2];
-        std::fill(first, open_blocks_.begin() + std::ptrdiff_t(end) * blocks_.stride[2], 0.0);
-        for (int k = int(begin) * block_; k < std::min(int(end) * block_, grid_.cells.z()); ++k)
+    const int n = grid_.cells.x();
+    const auto open_row = [&](int j, int k, auto&& visit) {
+        const std::size_t c0 = layout_.index(0, j, k);
+        if (cell_solid)
+            for (int i = 0; i < n; ++i) visit(i, c0 + std::size_t(i), 1.0 - (*cell_solid)[c0 + std::size_t(i)]);
+        else
+            for (int i = 0; i < n; ++i) visit(i, c0 + std::size_t(i), 1.0);
+    };
+    const auto find_plane = [&](int plane) {
+        const int k_end = std::min((plane + 1) * block_, grid_.cells.z());
+        bool same = true;
+        for (int k = plane * block_; k < k_end && same; ++k)
+            for (int j = 0; j < grid_.cells.y() && same; ++j) {
+                int different = 0;
+                open_row(j, k, [&](int, std::size_t c, double open) { different += open_cells_[c] != open; });
+                same = different == 0;
+            }
+        if (same) return;
+        const auto first = open_blocks_.begin() + plane * blocks_.stride[2];
+        std::fill(first, first + blocks_.stride[2], 0.0);
+        for (int k = plane * block_; k < k_end; ++k)
             for (int j = 0; j < grid_.cells.y(); ++j) {
-                const std::size_t c0 = layout_.index(0, j, k);
-                double* sum = open_blocks_.data() + (k / block_) * blocks_.stride[2] + (j / block_) * blocks_.stride[1];
-                for (int i = 0; i < grid_.cells.x(); ++i) {
-                    const double open = cell_solid ? 1.0 - (*cell_solid)[c0 + std::size_t(i)] : 1.0;
-                    open_cells_[c0 + std::size_t(i)] = open;
+                double* sum = open_blocks_.data() + block_row(j, k);
+                open_row(j, k, [&](int i, std::size_t c, double open) {
+                    open_cells_[c] = open;
                     sum[i / block_] += open;
+                });
+            }
+        for (int k = plane * block_; k < k_end; ++k)
+            for (int j = 0; j < grid_.cells.y(); ++j) {
+                const double* sum = open_blocks_.data() + block_row(j, k);
+                const std::size_t c0 = layout_.index(0, j, k);
+                for (int i = 0; i < n; ++i) {
+                    const int b = i / block_;
+                    share_[c0 + std::size_t(i)] = sum[b] > 0.0 ? open_cells_[c0 + std::size_t(i)] / sum[b]
+                                                               : 1.0 / cells_in_block(b, j / block_, k / block_);
                 }
             }
+    };
+    parallel_blocks(std::size_t(blocks_.cells.z()), planes_per_slab, [&](std::size_t begin, std::size_t end) {
+        for (int plane = int(begin); plane < int(end); ++plane) find_plane(plane);
     });
 }
 
@@ -156,39 +227,43 @@ void FineCoupling::add_row(Weights& weights, const Target& target, const Field* 
         return kernel_table(scale * (dx * dx + squared));
     };
     const std::ptrdiff_t base = target.offset + j * target.stride[1] + k * target.stride[2];
-    const auto add_run = [&](int first, int length) {  // appends zeros; returns where they start
-        weights.rows.push_back({std::uint32_t(base + first), k, length});
-        weights.values.resize(weights.values.size() + std::size_t(length), 0.0);
-        return weights.values.data() + weights.values.size() - length;
+    const auto add_run = [&](int first, int length) {
+        return weights.append({std::uint32_t(base + first), std::int16_t(first), std::int16_t(j), std::int16_t(k),
+                               std::int16_t(length)});
     };
-    const auto shut = [&](double* values, int first, int length) {
-        if (open)
-            for (int l = 0; l < length; ++l) values[l] *= (*open)[std::size_t(base + first + l)];
+    const auto fill = [&](int position, int first, int length) {  // position: before it is wrapped
+        double* values = add_run(first, length);
+        const double* openness = open ? open->data() + base + first : nullptr;
+        for (int l = 0; l < length; l += 4) {
+            const Lanes dx = (position + l + 0.5) * h - x + h * Lanes(0.0, 1.0, 2.0, 3.0);
+            Lanes four = kernel_table((scale * (dx * dx + squared)).eval());
+            if (openness) four *= Eigen::Map<const Lanes>(openness + l);
+            Eigen::Map<Lanes>(values + l) = four;
+        }
+        for (int l = length; l % 4 != 0; ++l) values[l] = 0.0;
     };
     if (low > high) return;
     if (grid_.periodic(0)) {
         for (int i = low; i <= high;) {
             const int first = wrap(i, n), length = std::min(high - i + 1, n - first);
-            double* values = add_run(first, length);
-            for (int l = 0; l < length; ++l) values[l] = weight(i + l);
-            shut(values, first, length);
+            fill(i, first, length);
             i += length;
         }
         return;
     }
     if (low >= 0 && high < n) {
-        const int length = high - low + 1;
-        double* values = add_run(low, length);
-        for (int l = 0; l < length; ++l) values[l] = weight(low + l);
-        shut(values, low, length);
+        fill(low, low, high - low + 1);
         return;
     }
     const bool wide = high - low + 1 >= n;
     const int first = wide || low < 0 ? 0 : std::min(low, fold(high, n));
     const int last = wide || high >= n ? n - 1 : std::max(high, fold(low, n));
-    double* values = add_run(first, last - first + 1);
+    const int length = last - first + 1;
+    double* values = add_run(first, length);
+    std::fill(values, weights.values.data() + weights.used, 0.0);
     for (int i = low; i <= high; ++i) values[fold(i, n) - first] += weight(i);
-    shut(values, first, last - first + 1);
+    if (open)
+        for (int l = 0; l < length; ++l) values[l] *= (*open)[std::size_t(base + first + l)];
 }
 
 void FineCoupling::add_particle(Weights& weights, const Target& target, const Field& open, double radius,
@@ -206,7 +281,7 @@ void FineCoupling::add_particle(Weights& weights, const Target& target, const Fi
     const auto target_cell = [&](int i, int d) {
         return grid_.periodic(d) ? wrap(i, target.cells[d]) : fold(i, target.cells[d]);
     };
-    const std::size_t first_row = weights.rows.size(), first_value = weights.values.size();
+    const std::size_t first_row = weights.rows.size(), first_value = weights.used;
     for (const Field* pass :
          {&open, static_cast<const Field*>(nullptr)}) {  // the second when every cell around is solid
         for (int k = int(std::ceil((x.z() - radius) / h - 0.5)); k <= int(std::floor((x.z() + radius) / h - 0.5));
@@ -218,24 +293,26 @@ void FineCoupling::add_particle(Weights& weights, const Target& target, const Fi
                 add_row(weights, target, pass, radius, x.x(), dy * dy + dz * dz, target_cell(j, 1), target_cell(k, 2));
             }
         }
-        double sum = 0.0;
-        for (std::size_t v = first_value; v < weights.values.size(); ++v) sum += weights.values[v];
+        double* const values = weights.values.data() + first_value;
+        const auto count = std::ptrdiff_t(weights.used - first_value);
+        const double sum = detail::lane_sum(count, [&](std::ptrdiff_t v) { return values[v]; });
         if (sum > 1e-6 || !pass) {
-            for (std::size_t v = first_value; v < weights.values.size(); ++v) weights.values[v] /= sum;
+            const double factor = 1.0 / sum;
+            for (std::ptrdiff_t v = 0; v < count; ++v) values[v] *= factor;
             break;
         }
         weights.rows.resize(first_row);
-        weights.values.resize(first_value);
+        weights.used = first_value;
     }
     std::int32_t low = target.cells.z(), high = -1;
     for (std::size_t r = first_row; r < weights.rows.size(); ++r) {
-        low = std::min(low, weights.rows[r].plane);
-        high = std::max(high, weights.rows[r].plane);
+        low = std::min(low, std::int32_t(weights.rows[r].z));
+        high = std::max(high, std::int32_t(weights.rows[r].z));
     }
     weights.low_plane.push_back(low);
     weights.high_plane.push_back(high);
     weights.first_row.push_back(weights.rows.size());
-    weights.first_value.push_back(weights.values.size());
+    weights.first_value.push_back(weights.used);
 }
 
 /// Radius of the volume kernel [m].
@@ -250,8 +327,7 @@ void FineCoupling::find_weights(std::vector<Weights>& chunks, const Target& targ
     chunks.resize((positions.size() + particles_per_chunk - 1) / particles_per_chunk);
     parallel_blocks(positions.size(), particles_per_chunk, [&](std::size_t begin, std::size_t end) {
         Weights& weights = chunks[begin / particles_per_chunk];
-        weights.rows.clear(), weights.values.clear(), weights.low_plane.clear(), weights.high_plane.clear();
-        weights.first_row.assign(1, 0), weights.first_value.assign(1, 0);
+        weights.clear();
         for (std::size_t o = begin; o < end; ++o) {
             const std::size_t p = order_[o];
             add_particle(weights, target, open, factor * support_radius(diameters[p]), positions[p]);
@@ -263,37 +339,41 @@ void FineCoupling::find_own_overlap()
 {
     own_overlap_.assign(count_, 0.0);
     if (options_.self_disturbance == SelfDisturbance::kept) return;
+    std::vector<std::int32_t> block_of(std::size_t(grid_.cells.maxCoeff()));
+    for (std::size_t i = 0; i < block_of.size(); ++i) block_of[i] = std::int32_t(i) / block_;
     parallel_blocks(volume_.size(), 1, [&](std::size_t chunk, std::size_t) {
         thread_local Field felt;  // zero between particles
         felt.resize(blocks_.total, 0.0);
         const Weights &narrow = volume_[chunk], &wide = felt_[chunk];
         for (std::size_t p = 0; p < narrow.low_plane.size(); ++p) {
+            const std::span<const Row> rows(narrow.rows.data() + narrow.first_row[p],
+                                            narrow.rows.data() + narrow.first_row[p + 1]);
+            int low_y = grid_.cells.y(), high_y = 0;
+            for (const Row& row : rows) low_y = std::min(low_y, int(row.y)), high_y = std::max(high_y, int(row.y));
+            low_y /= block_, high_y /= block_;
+            const int low_z = narrow.low_plane[p] / block_, high_z = narrow.high_plane[p] / block_;
             const auto each_wide = [&](auto&& visit) {
                 const double* weight = wide.values.data() + wide.first_value[p];
                 for (std::size_t r = wide.first_row[p]; r < wide.first_row[p + 1]; ++r) {
                     const Row& row = wide.rows[r];
-                    if (row.plane >= narrow.low_plane[p] / block_ && row.plane <= narrow.high_plane[p] / block_)
-                        for (int l = 0; l < row.length; ++l) visit(felt[row.start + std::size_t(l)], weight[l]);
-                    weight += row.length;
+                    if (row.z >= low_z && row.z <= high_z && row.y >= low_y && row.y <= high_y)
+                        for (std::size_t l = 0; l < std::size_t(row.length); ++l) visit(row.start + l, weight[l]);
+                    weight += row.lanes();
                 }
             };
-            each_wide([](double& at, double weight) { at += weight; });
+            each_wide([&](std::size_t b, double weight) { felt[b] += open_blocks_[b] > 0.0 ? weight : 0.0; });
             double sum = 0.0;
             const double* weight = narrow.values.data() + narrow.first_value[p];
-            for (std::size_t r = narrow.first_row[p]; r < narrow.first_row[p + 1]; ++r) {
-                const Row& row = narrow.rows[r];
-                const std::ptrdiff_t in_plane = std::ptrdiff_t(row.start) - cells_.offset - row.plane * cells_.stride[2];
-                const std::ptrdiff_t j = in_plane / cells_.stride[1], i = in_plane - j * cells_.stride[1];
-                const std::ptrdiff_t b0 = (row.plane / block_) * blocks_.stride[2] + (j / block_) * blocks_.stride[1];
-                for (int l = 0; l < row.length; ++l) {
-                    const auto b = std::size_t(b0 + (i + l) / block_);
-                    const double open = open_blocks_[b];
-                    if (open > 0.0) sum += weight[l] * felt[b] * open_cells_[row.start + std::size_t(l)] / open;
-                }
-                weight += row.length;
+            for (const Row& row : rows) {
+                const double* in_row = felt.data() + std::size_t(block_of[std::size_t(row.z)]) * std::size_t(blocks_.stride[2]) +
+                                       std::size_t(block_of[std::size_t(row.y)]) * std::size_t(blocks_.stride[1]);
+                const double* share = share_.data() + row.start;
+                const std::int32_t* block = block_of.data() + row.x;
+                sum += detail::lane_sum(row.length, [&](std::ptrdiff_t l) { return weight[l] * in_row[block[l]] * share[l]; });
+                weight += row.lanes();
             }
             own_overlap_[order_[chunk * particles_per_chunk + p]] = sum;
-            each_wide([](double& at, double) { at = 0.0; });
+            each_wide([&](std::size_t b, double) { felt[b] = 0.0; });
         }
     });
 }
