@@ -1,5 +1,6 @@
 // The explicit half of a step: convection, viscosity, old pressure gradient, drag of the fines.
 #include <chrono>
+#include <vector>
 
 #include "core/parallel.h"
 #include "fluid/detail/advection.h"
@@ -219,28 +220,26 @@ void Flow::apply_fines(double dt)
         const Pair sums =
             parallel_sum(range.planes(), planes_per_block, Pair(0.0, 0.0), [&](std::size_t begin, std::size_t end) {
                 Pair sum(0.0, 0.0);
+                const std::ptrdiff_t n = range.row_length();
+                std::vector<double> drag(static_cast<std::size_t>(n)), fines(drag);
+                double *const drag_row = drag.data(), *const fines_row = fines.data();
+                const auto lanes = [](std::ptrdiff_t m, const auto& v) { return detail::lane_sum(m, v); };
                 for (int k = range.low.z() + int(begin); k < range.low.z() + int(end); ++k)
                     for (int j = range.low.y(); j < range.high.y(); ++j) {
                         const auto f0 = std::ptrdiff_t(layout_.index(range.low.x(), j, k));
-                        const auto lanes = [](std::ptrdiff_t m, const auto& v) { return detail::lane_sum(m, v); };
-                        // value() is called twice at outlet ends: it must not change us, so the update comes afterwards
-                        const auto drag = [&](std::ptrdiff_t i) {
+#pragma GCC ivdep
+                        for (std::ptrdiff_t i = 0; i < n; ++i) {
                             const std::ptrdiff_t f = f0 + i;
                             const double face_eps = 0.5 * (eps[f] + eps[f - own]);
                             const double start = us[f] + repair;
-                            return face_eps *
-                                   ((face_eps * start + dt * (A[f] * u[f] - B[f])) / (face_eps + dt * A[f]) - start);
-                        };
-                        const auto fines = [&](std::ptrdiff_t i) {
-                            const std::ptrdiff_t f = f0 + i;
-                            return (0.5 * (eps[f] + eps[f - own]) - 1.0) * (p[f] - p[f - own]);
-                        };
-                        sum[0] += detail::weighted_row(grid_, axis, range, j, k, lanes, drag);
-                        sum[1] += detail::weighted_row(grid_, axis, range, j, k, lanes, fines);
-                        for (std::ptrdiff_t f = f0; f < f0 + range.row_length(); ++f) {
-                            const double face_eps = 0.5 * (eps[f] + eps[f - own]);
-                            us[f] = (face_eps * (us[f] + repair) + dt * (A[f] * u[f] - B[f])) / (face_eps + dt * A[f]);
+                            us[f] = (face_eps * start + dt * (A[f] * u[f] - B[f])) / (face_eps + dt * A[f]);
+                            drag_row[i] = face_eps * (us[f] - start);
+                            fines_row[i] = (face_eps - 1.0) * (p[f] - p[f - own]);
                         }
+                        sum[0] += detail::weighted_row(grid_, axis, range, j, k, lanes,
+                                                       [&](std::ptrdiff_t i) { return drag_row[i]; });
+                        sum[1] += detail::weighted_row(grid_, axis, range, j, k, lanes,
+                                                       [&](std::ptrdiff_t i) { return fines_row[i]; });
                     }
                 return sum;
             });
