@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "sdf/extend.h"
 #include "sdf/mesh.h"
 
 namespace coral::dem::detail {
@@ -18,17 +19,7 @@ sdf::DistanceGrid cut_out(const sdf::DistanceGrid& grid, const Eigen::Vector3d& 
     const auto cell = [&](const Eigen::Array3d& p) { return Eigen::Array3i(((p - grid.origin.array()) / grid.spacing).floor().cast<int>()); };
     const Eigen::Array3i last = grid.size.array() - 2;
     const Eigen::Vector3i low = cell(point.array() - distance).max(0).min(last), high = cell(point.array() + distance).max(0).min(last);
-    sdf::DistanceGrid part;
-    part.size = high - low + Eigen::Vector3i::Constant(2);
-    part.origin = grid.node(low.x(), low.y(), low.z());
-    part.spacing = grid.spacing;
-    part.distance.reserve(part.node_count());
-    for (int k = 0; k < part.size.z(); ++k)
-        for (int j = 0; j < part.size.y(); ++j) {
-            const auto row = grid.distance.begin() + std::ptrdiff_t(grid.index(low.x(), low.y() + j, low.z() + k));
-            part.distance.insert(part.distance.end(), row, row + part.size.x());
-        }
-    return part;
+    return sdf::part(grid, low, high + Eigen::Vector3i::Ones());
 }
 
 }  // namespace

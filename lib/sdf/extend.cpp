@@ -72,6 +72,23 @@ DistanceGrid extended(const DistanceGrid& grid, double outside_distance)
     return result;
 }
 
+DistanceGrid part(const DistanceGrid& grid, const Eigen::Vector3i& low, const Eigen::Vector3i& high)
+{
+    DistanceGrid result;
+    result.spacing = grid.spacing;
+    result.outside_limit = grid.outside_limit;
+    result.inside_limit = grid.inside_limit;
+    result.size = high - low + Eigen::Vector3i::Ones();
+    result.origin = grid.node(low.x(), low.y(), low.z());
+    result.distance.reserve(result.node_count());
+    for (int k = low.z(); k <= high.z(); ++k)
+        for (int j = low.y(); j <= high.y(); ++j) {
+            const auto row = grid.distance.begin() + std::ptrdiff_t(grid.index(low.x(), j, k));
+            result.distance.insert(result.distance.end(), row, row + result.size.x());
+        }
+    return result;
+}
+
 DistanceGrid trimmed(const DistanceGrid& grid, int margin)
 {
     Eigen::Vector3i low = grid.size, high = Eigen::Vector3i::Constant(-1);
@@ -83,21 +100,7 @@ DistanceGrid trimmed(const DistanceGrid& grid, int margin)
                 high = high.cwiseMax(Eigen::Vector3i(i, j, k));
             }
     if (high.x() < 0) return grid;
-    low = (low.array() - margin).max(0);
-    high = (high.array() + margin).min(grid.size.array() - 1);
-    DistanceGrid part;
-    part.spacing = grid.spacing;
-    part.outside_limit = grid.outside_limit;
-    part.inside_limit = grid.inside_limit;
-    part.size = high - low + Eigen::Vector3i::Ones();
-    part.origin = grid.node(low.x(), low.y(), low.z());
-    part.distance.reserve(part.node_count());
-    for (int k = low.z(); k <= high.z(); ++k)
-        for (int j = low.y(); j <= high.y(); ++j) {
-            const auto row = grid.distance.begin() + std::ptrdiff_t(grid.index(low.x(), j, k));
-            part.distance.insert(part.distance.end(), row, row + part.size.x());
-        }
-    return part;
+    return part(grid, (low.array() - margin).max(0), (high.array() + margin).min(grid.size.array() - 1));
 }
 
 }  // namespace coral::sdf

@@ -14,6 +14,9 @@ namespace coral::sdf {
 /// \throws Error when the band is narrower than 2 nodes
 DistanceGrid extended(const DistanceGrid& grid, double outside_distance);
 
+/// The nodes low..high of a lattice, both with.
+DistanceGrid part(const DistanceGrid& grid, const Eigen::Vector3i& low, const Eigen::Vector3i& high);
+
 /// The part of the lattice around the solid, with `margin` positive nodes on each side where the lattice has them (at least 1).
 /// The surface stays as it is; distances farther outside go. A grid without solid stays whole.
 DistanceGrid trimmed(const DistanceGrid& grid, int margin);
