@@ -155,7 +155,6 @@ bool World::Impl::press_on_walls(std::size_t k, double dt, GeneralForce& out, Lo
         moved = 0.0;
         if (is_loose()) return false;
     }
-    if (l.touch[k] == 0 && (pocket.quads.empty() || pocket.quads.front().clearance >= r + moved)) return false;
     const PairLaw& pair = law(material[i], material[j]);
     const double stiffness = pair.kn * scale[j] * scale[j] / (2.0 * std::numbers::pi * radius[i]);
     Slots& slots = l.slots[k];
