@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "core/error.h"
 #include "core/parallel.h"
@@ -15,12 +16,13 @@ namespace coral::suffusion {
 
 namespace {
 
-// Cost of one step, measured with suffuse on one core of a shared two-core machine (docs/observables.md, performance).
-constexpr double seconds_per_cell = 6e-8;          ///< fluid step, per cell
-constexpr double seconds_per_fine = 2e-5;          ///< kernel gather and spread, per fine and fluid step, at support 2d/4d
-constexpr double seconds_per_grain_contact = 2e-7; ///< contact step, per grain
-constexpr double bytes_per_cell = 260;
-constexpr double pore_speed_ratio = 15;            ///< max sum |u_i| / superficial velocity in a gap-graded bed [measured in packed beds]
+// Cost of one step, measured with suffuse on one core of a shared two-core machine: the paper's case and the small studies (docs/validation/flow-speed.md).
+constexpr double seconds_per_cell = 1.1e-7;        ///< fluid step, per cell
+constexpr double seconds_per_solid_cell = 9e-8;    ///< placing and forcing resolved grains, per cell in them
+constexpr double seconds_per_fine = 4e-5;          ///< kernel gather and spread, per fine and fluid step, at support 2d/4d and 2 to 6 cells per diameter
+constexpr double seconds_per_grain_contact = 9e-7; ///< contact step, per grain
+constexpr double bytes_per_cell = 700;
+constexpr double pore_speed_ratio = 18;            ///< max sum |u_i| / superficial velocity in a gap-graded bed [measured: 15 to 20]
 
 PopulationPlan population_of(const pack::Sample& sample, pack::Role role, double cell)
 {
@@ -109,7 +111,11 @@ void predict(Plan& plan, const pack::Sample& sample)
     plan.memory = cells * bytes_per_cell + grids + 2e3 * static_cast<double>(sample.particles.size()) + 5e7;
     const double fines = static_cast<double>(plan.populations[1].count), grains = static_cast<double>(sample.particles.size());
     const double speed_up = 1 + 0.7 * (std::min(thread_count(), 16) - 1);
-    plan.run_time = (plan.flow_steps * (cells * seconds_per_cell + fines * seconds_per_fine) + plan.dem_steps * grains * seconds_per_grain_contact) / speed_up;
+    double solid_cells = 0;
+    for (const pack::Particle& p : sample.particles)
+        if (p.role == pack::Role::coarse) solid_cells += std::numbers::pi / 6 * std::pow(pack::equivalent_diameter(sample, p) / dx, 3);
+    const double flow = cells * seconds_per_cell + solid_cells * seconds_per_solid_cell + fines * seconds_per_fine;
+    plan.run_time = (plan.flow_steps * flow + plan.dem_steps * grains * seconds_per_grain_contact) / speed_up;
 }
 
 void warn(Plan& plan)
