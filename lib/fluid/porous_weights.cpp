@@ -339,7 +339,7 @@ void FineCoupling::find_own_overlap()
 {
     own_overlap_.assign(count_, 0.0);
     if (options_.self_disturbance == SelfDisturbance::kept) return;
-    std::vector<std::int32_t> block_of(std::size_t(grid_.cells.maxCoeff()));
+    std::vector<std::int32_t> block_of(std::size_t(grid_.cells.x()));
     for (std::size_t i = 0; i < block_of.size(); ++i) block_of[i] = std::int32_t(i) / block_;
     parallel_blocks(volume_.size(), 1, [&](std::size_t chunk, std::size_t) {
         thread_local Field felt;  // zero between particles
@@ -365,11 +365,11 @@ void FineCoupling::find_own_overlap()
             double sum = 0.0;
             const double* weight = narrow.values.data() + narrow.first_value[p];
             for (const Row& row : rows) {
-                const double* in_row = felt.data() + std::size_t(block_of[std::size_t(row.z)]) * std::size_t(blocks_.stride[2]) +
-                                       std::size_t(block_of[std::size_t(row.y)]) * std::size_t(blocks_.stride[1]);
+                const double* in_row = felt.data() + block_row(row.y, row.z);
                 const double* share = share_.data() + row.start;
                 const std::int32_t* block = block_of.data() + row.x;
-                sum += detail::lane_sum(row.length, [&](std::ptrdiff_t l) { return weight[l] * in_row[block[l]] * share[l]; });
+                sum += detail::lane_sum(
+                    row.length, [=](std::ptrdiff_t l) { return weight[l] * in_row[block[l]] * share[l]; });
                 weight += row.lanes();
             }
             own_overlap_[order_[chunk * particles_per_chunk + p]] = sum;
