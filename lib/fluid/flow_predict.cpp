@@ -74,9 +74,12 @@ void Flow::sweep_component(int axis, double dt, double now, double before)
         const int k_begin = range.low.z() + int(begin), k_end = range.low.z() + int(end);
         const auto start_row = [&](int direction, std::ptrdiff_t f0, std::ptrdiff_t count, double* __restrict g,
                                    double* __restrict q) {
+#pragma GCC ivdep
             for (std::ptrdiff_t i = 0; i < count; ++i) g[i] = low_flux<porous, convection>(view, direction, f0 + i);
-            if constexpr (advective)
+            if constexpr (advective) {
+#pragma GCC ivdep
                 for (std::ptrdiff_t i = 0; i < count; ++i) q[i] = low_volume_flux(view, direction, f0 + i);
+            }
         };
         for (int j = range.low.y(); j < range.high.y(); ++j)
             start_row(2, std::ptrdiff_t(layout_.index(range.low.x(), j, k_begin)), n, gz + j * sy, qz + j * sy);
