@@ -9,6 +9,7 @@
 #include "core/output_file.h"
 #include "pack/sample.h"
 #include "suffusion/case_file.h"
+#include "suffusion/plan.h"
 #include "tools/run_program.h"
 
 namespace coral::test {
@@ -122,6 +123,19 @@ TEST(MakeCase, a_cylinder_is_refused_by_it_and_by_suffuse)
     const ProgramResult info = run_program("grain-info case/sample.h5", folder.path());
     EXPECT_EQ(info.exit_code, 0) << info.err;
     EXPECT_NE(info.out.find("a cylinder of 40"), std::string::npos) << info.out;
+}
+
+TEST(MakeCase, takes_cells_over_which_transforms_are_fast)
+{
+    // 0.39 mm asks for 61 or 62 cells (61 and 31 are prime)
+    const suffusion::Plan plan = suffusion::make_plan(small_sample(true), {.cell = 0.39e-3});
+    for (const int axis : {0, 1}) {
+        int cells = plan.domain.cells[axis];
+        for (const int prime : {2, 3, 5, 7})
+            while (cells % prime == 0) cells /= prime;
+        EXPECT_EQ(cells, 1) << plan.domain.cells[axis];
+    }
+    EXPECT_NEAR(plan.domain.cell, 0.39e-3, 0.05 * 0.39e-3);
 }
 
 TEST(MakeCase, explain_prints_the_plan_and_writes_nothing)
