@@ -76,6 +76,7 @@ TEST(Extended, refuses_a_band_too_narrow_for_its_surface)
 }
 
 }  // namespace
+
 TEST(Trimmed, keeps_the_surface_and_the_margin)
 {
     const double radius = 6.3, h = 1.0;

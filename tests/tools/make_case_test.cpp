@@ -127,7 +127,7 @@ TEST(MakeCase, a_cylinder_is_refused_by_it_and_by_suffuse)
 
 TEST(MakeCase, takes_cells_over_which_transforms_are_fast)
 {
-    // 0.39 mm asks for 61 or 62 cells (61 and 31 are prime)
+    // Nearest to 0.39 mm are 62 = 2 x 31 cells; y would fit 58 = 2 x 29 best.
     const suffusion::Plan plan = suffusion::make_plan(small_sample(true), {.cell = 0.39e-3});
     for (const int axis : {0, 1}) {
         int cells = plan.domain.cells[axis];
