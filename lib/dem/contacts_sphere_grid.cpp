@@ -12,6 +12,7 @@ namespace {
 
 using detail::Lanes;
 
+constexpr std::size_t fetched_quads = 2;  ///< triangles are asked for so many quads ahead
 constexpr double same_wall = 0.8;  ///< cosine: places on a sphere within 37 degrees of each other share a friction spring
 
 /// Slot of the wall with this normal (frame of the grid), or a new one.
@@ -162,8 +163,10 @@ bool World::Impl::press_on_walls(std::size_t k, double dt, GeneralForce& out, Lo
     PressMemory now;
     Vec3 push = Vec3::Zero();
     detail::QuadPress press;
-    for (const detail::FacetQuad& quad : pocket.quads) {
+    for (std::size_t n = 0; n < pocket.quads.size(); ++n) {
+        const detail::FacetQuad& quad = pocket.quads[n];
         if (quad.clearance >= r + moved) break;
+        if (n + fetched_quads < pocket.quads.size()) detail::prefetch(pocket.quads[n + fetched_quads]);
         if (detail::press_on(quad, local, r, press)) places.add(press);
     }
     for (int p = 0; p < places.count; ++p) {
@@ -338,8 +341,8 @@ void World::Impl::sphere_grid_loop(double dt)
             for (const auto& [data, size] : {std::pair<const void*, std::size_t>{&l.press[k], sizeof(PressMemory)}, {&l.slots[k], sizeof(Slots)}})
                 for (std::size_t byte = 0; byte < size; byte += 64) __builtin_prefetch(static_cast<const char*>(data) + byte, 1);
             if (nearest || !(l.within[k] > 0.0)) return;
-            const auto* quads = reinterpret_cast<const char*>(l.pocket[k].quads.data());
-            for (std::size_t byte = 0; byte < 2 * sizeof(detail::FacetQuad); byte += 64) __builtin_prefetch(quads + byte);
+            const std::vector<detail::FacetQuad>& quads = l.pocket[k].quads;
+            for (std::size_t at = 0; at < std::min(fetched_quads, quads.size()); ++at) detail::prefetch(quads[at]);
         };
         constexpr std::size_t ahead = 4;
         const auto fetch_pocket = [&](std::size_t n) {

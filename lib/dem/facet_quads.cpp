@@ -4,6 +4,9 @@
 #include <cmath>
 #include <numbers>
 
+// Lanes are passed by value inline only, as in lanes.h.
+#pragma GCC diagnostic ignored "-Wpsabi"
+
 namespace coral::dem::detail {
 
 namespace {
@@ -61,15 +64,15 @@ struct DiscParts {
 
     void close()
     {
-        for (int k = 0; k < lane_count; ++k) {
-            if (!arcs[k]) continue;
-            double angle = std::atan2(turn_im[k], turn_re[k]);
-            // Between 0 and 2 pi; rounding must not make one of the other.
-            if (!crossed[k]) angle = foot_in[k] ? 2.0 * std::numbers::pi : 0.0;
-            else if (angle < -1e-6) angle += 2.0 * std::numbers::pi;
-            area[k] += 0.5 * a2[k] * angle;
-            polar[k] += 0.25 * a2[k] * a2[k] * angle;
-        }
+        if (!any(arcs)) return;
+        const Lanes zero = all(0.0), whole = all(2.0 * std::numbers::pi);
+        Lanes angle = argument(turn_re, turn_im);
+        // Between 0 and 2 pi; rounding must not make one of the other.
+        angle = angle < all(-1e-6) ? angle + whole : angle;
+        angle = crossed ? angle : foot_in ? whole : zero;
+        angle = arcs ? angle : zero;
+        area += all(0.5) * a2 * angle;
+        polar += all(0.25) * a2 * a2 * angle;
     }
 };
 
@@ -77,12 +80,13 @@ struct DiscParts {
 
 void FacetQuad::set(int lane, const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c)
 {
-    const Eigen::Vector3d* const corners[] = {&a, &b, &c};
+    const Eigen::Vector3f rounded[] = {a.cast<float>(), b.cast<float>(), c.cast<float>()};
+    const auto side = [&](int from, int to) { return (rounded[to].cast<double>() - rounded[from].cast<double>()).eval(); };
     for (int k = 0; k < 3; ++k) {
-        set_lane(corner[k], lane, *corners[k]);
-        per_length[k][lane] = 1.0 / (*corners[(k + 1) % 3] - *corners[k]).norm();
+        for (int axis = 0; axis < 3; ++axis) corner[k][axis][lane] = rounded[k][axis];
+        per_length[k][lane] = 1.0 / side(k, (k + 1) % 3).norm();
     }
-    set_lane(normal, lane, (b - a).cross(c - a).normalized());
+    set_lane(normal, lane, side(0, 1).cross(side(0, 2)).normalized());
 }
 
 void FacetQuad::clear(int lane)
@@ -95,11 +99,11 @@ bool press_on(const FacetQuad& quad, const Eigen::Vector3d& centre, double radiu
 {
     const Lanes zero = all(0.0);
     const Vec3Lanes c{all(centre.x()), all(centre.y()), all(centre.z())};
-    const Vec3Lanes p = quad.corner[0] - c;
+    const Vec3Lanes p = quad.corner_from(c, 0);
     const Lanes height = dot(quad.normal, p);
     DiscParts parts{all(radius * radius) - height * height};
     if (!any(parts.a2 > zero)) return false;
-    const Vec3Lanes q = quad.corner[1] - c, s = quad.corner[2] - c;
+    const Vec3Lanes q = quad.corner_from(c, 1), s = quad.corner_from(c, 2);
     parts.side(p, q, quad.normal, quad.per_length[0]);
     parts.side(q, s, quad.normal, quad.per_length[1]);
     parts.side(s, p, quad.normal, quad.per_length[2]);

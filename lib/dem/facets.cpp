@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 
 #include "sdf/extend.h"
@@ -69,33 +70,58 @@ std::size_t Facets::memory() const
     return balls_.size() * (sizeof(Ball) + sizeof(Corners)) + start_.size() * sizeof(std::int32_t);
 }
 
-void Facets::gather(const Eigen::Vector3d& point, double distance, std::vector<Near>& list) const
+template <class Visit>
+void Facets::for_each_near(const Eigen::Vector3d& point, double distance, const Visit& visit) const
 {
     // A triangle belongs to the block of its centroid and reaches at most a cell's diagonal beyond it.
     const double wide = distance + 2.0 * edge_ / cells_per_block;
     const auto block = [&](const Eigen::Array3d& p) { return Eigen::Vector3i((p / edge_).floor().cast<int>()); };
     const Eigen::Vector3i low = block((point - origin_).array() - wide).cwiseMax(0), high = block((point - origin_).array() + wide).cwiseMin((blocks_.array() - 1).matrix());
     if (low.x() > high.x()) return;
-    const std::size_t begin = list.size();
     for (int k = low.z(); k <= high.z(); ++k)
         for (int j = low.y(); j <= high.y(); ++j) {
             const std::size_t row = std::size_t(blocks_.x()) * (std::size_t(j) + std::size_t(blocks_.y()) * std::size_t(k));
-            for (std::int32_t t = start_[row + std::size_t(low.x())]; t < start_[row + std::size_t(high.x()) + 1]; ++t)
-                if (const double d = clearance(t, point); d < distance) list.push_back({t, float(d)});
+            for (std::int32_t t = start_[row + std::size_t(low.x())]; t < start_[row + std::size_t(high.x()) + 1]; ++t) {
+                const Ball& ball = balls_[std::size_t(t)];
+                const double reach = distance + double(ball.radius);
+                if ((Eigen::Vector3d(ball.x, ball.y, ball.z) - point).squaredNorm() < reach * reach) visit(t);
+            }
         }
+}
+
+void Facets::gather(const Eigen::Vector3d& point, double distance, std::vector<Near>& list) const
+{
+    const std::size_t begin = list.size();
+    for_each_near(point, distance, [&](std::int32_t t) {
+        if (const double d = clearance(t, point); d < distance) list.push_back({t, float(d)});
+    });
     std::sort(list.begin() + std::ptrdiff_t(begin), list.end(),
               [](const Near& a, const Near& b) { return a.clearance < b.clearance || (a.clearance == b.clearance && a.triangle < b.triangle); });
 }
 
-/// Lower bound of the distance: to the part of the plane within the ball around the triangle.
+double Facets::nearest(const Eigen::Vector3d& point, double distance) const
+{
+    double least = distance;
+    for_each_near(point, distance, [&](std::int32_t t) { least = std::min(least, clearance(t, point)); });
+    return least;
+}
+
+/// The distance, rounded down. A bound that is seldom below it pays: what it lets through is looked at in every step.
 double Facets::clearance(std::int32_t triangle, const Eigen::Vector3d& point) const
 {
-    const Ball& ball = balls_[std::size_t(triangle)];
     const float* at = corners_[std::size_t(triangle)].at;
-    const Eigen::Vector3d a(at[0], at[1], at[2]), b(at[3], at[4], at[5]), c(at[6], at[7], at[8]);
-    const double height = (b - a).cross(c - a).normalized().dot(a - point), away2 = (Eigen::Vector3d(ball.x, ball.y, ball.z) - point).squaredNorm();
-    const double beside = std::sqrt(std::max(away2 - height * height, 0.0)) - double(ball.radius);
-    return (1.0 - 1e-6) * std::hypot(height, std::max(beside, 0.0));  // rounding stays on the safe side
+    const Eigen::Vector3d corner[] = {Eigen::Vector3d(at[0], at[1], at[2]) - point, Eigen::Vector3d(at[3], at[4], at[5]) - point,
+                                      Eigen::Vector3d(at[6], at[7], at[8]) - point};
+    const Eigen::Vector3d normal = (corner[1] - corner[0]).cross(corner[2] - corner[0]).normalized();
+    bool above = true;
+    double squared = std::numeric_limits<double>::infinity();
+    for (int k = 0; k < 3; ++k) {
+        const Eigen::Vector3d side = corner[(k + 1) % 3] - corner[k];
+        above = above && corner[k].dot(side.cross(normal)) >= 0.0;
+        const double along = std::clamp(-corner[k].dot(side) / side.squaredNorm(), 0.0, 1.0);
+        squared = std::min(squared, (corner[k] + along * side).squaredNorm());
+    }
+    return (1.0 - 1e-6) * (above ? std::abs(normal.dot(corner[0])) : std::sqrt(squared));
 }
 
 void Facets::lay_out(std::span<const Near> list, std::vector<FacetQuad>& quads) const

@@ -167,11 +167,9 @@ void World::Impl::gather_pocket(std::size_t k)
     const double r = radius[std::size_t(l.sphere[k])] / scale[std::size_t(l.grid[k])], sight = l.within[k] - (l.listed[k] - l.cut[k]).norm();
     thread_local std::vector<detail::Facets::Near> near;
     near.clear();
-    pocket.surface->gather(l.listed[k], sight, near);
-    std::size_t count = 0;
-    while (count < near.size() && double(near[count].clearance) < (1.0 + stale_way) * r) ++count;
-    pocket.surface->lay_out({near.data(), count}, pocket.quads);
-    pocket.room = (near.empty() ? sight : double(near.front().clearance)) - r;
+    pocket.surface->gather(l.listed[k], std::min(sight, (1.0 + stale_way) * r), near);
+    pocket.surface->lay_out(near, pocket.quads);
+    pocket.room = (near.empty() ? pocket.surface->nearest(l.listed[k], sight) : double(near.front().clearance)) - r;
 }
 
 void World::Impl::make_pocket_here(std::size_t k)

@@ -10,18 +10,32 @@
 
 namespace coral::dem::detail {
 
-/// Four triangles side by side, with what stays the same while a ball moves over them.
-struct FacetQuad {
-    Vec3Lanes corner[3];
-    Vec3Lanes normal;      ///< unit; the corners run counter-clockwise about it
-    Lanes per_length[3];   ///< 1 / length of the side that begins at each corner [1/m]
-    double clearance;      ///< no triangle was nearer than this to where they were gathered [m]
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wpsabi"  // as in lanes.h
 
-    /// Puts a triangle into a lane. Its corners must span an area.
+/// Four triangles side by side, with what stays the same while a ball moves over them. A contact step of a packing reads thousands of them,
+/// more than its share of a cache holds, so corners are kept in the single precision that surfaces have, and none shares a line with the next.
+struct alignas(64) FacetQuad {
+    FloatLanes corner[3][3];  ///< by corner and axis [m]
+    double clearance;         ///< no triangle was nearer than this to where they were gathered [m]
+    Vec3Lanes normal;         ///< unit; the corners run counter-clockwise about it
+    Lanes per_length[3];      ///< 1 / length of the side that begins at each corner [1/m]
+
+    /// Puts a triangle into a lane, its corners rounded to single precision; they must span an area.
     void set(int lane, const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c);
     /// A lane that no ball touches.
     void clear(int lane);
+    /// Corner k as seen from a point.
+    [[gnu::always_inline]] Vec3Lanes corner_from(const Vec3Lanes& point, int k) const
+    {
+        return Vec3Lanes{widened(corner[k][0]), widened(corner[k][1]), widened(corner[k][2])} - point;
+    }
 };
+
+inline void prefetch(const FacetQuad& quad)
+{
+    for (std::size_t byte = 0; byte < sizeof quad; byte += 64) __builtin_prefetch(reinterpret_cast<const char*>(&quad) + byte);
+}
 
 /// Integrals over what a ball covers of each of four triangles.
 struct QuadPress {
@@ -30,6 +44,8 @@ struct QuadPress {
     Lanes size;       ///< of the force [m2]
     Lanes energy;     ///< int (R^2 - |c - x|^2)/(2R) dA [m3]
 };
+
+#pragma GCC diagnostic pop
 
 /// \returns whether the ball covers any part of any of them; `press` is set only then
 bool press_on(const FacetQuad& quad, const Eigen::Vector3d& centre, double radius, QuadPress& press);

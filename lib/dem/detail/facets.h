@@ -19,17 +19,22 @@ public:
     std::size_t size() const { return balls_.size(); }
     std::size_t memory() const;  ///< [bytes]
 
-    /// A triangle and how far it is at least from a point.
+    /// A triangle and its distance from a point, rounded down.
     struct Near {
         std::int32_t triangle;
         float clearance;  ///< [m]
     };
     /// Appends the triangles that come within `distance` of a point, nearest first.
     void gather(const Eigen::Vector3d& point, double distance, std::vector<Near>& list) const;
+    /// Distance of the nearest triangle, rounded down, or `distance` if that is less [m].
+    double nearest(const Eigen::Vector3d& point, double distance) const;
     /// Lays triangles out for press_on(), in the order of the list; what is left over of the last quad touches nothing.
     void lay_out(std::span<const Near> list, std::vector<FacetQuad>& quads) const;
 
 private:
+    /// Calls visit(triangle) for all that may come within `distance` of the point.
+    template <class Visit>
+    void for_each_near(const Eigen::Vector3d& point, double distance, const Visit& visit) const;
     double clearance(std::int32_t triangle, const Eigen::Vector3d& point) const;
     struct Ball {  ///< around a triangle
         float x, y, z, radius;
