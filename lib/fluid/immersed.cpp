@@ -171,10 +171,12 @@ struct ForcingRate {
           plain_blend(options.plain_blend)
     {
     }
+    /// \param slip before forcing. The rate is that of the slip after it, |slip|/(1 + chi): a quadratic in chi.
     double weight(double phi, double slip) const
     {
-        const double chi = (viscous + inertial * std::abs(slip)) * phi, open = 1.0 - phi;
-        return plain_blend || phi >= 1.0 ? phi : chi / (open + chi);
+        const double open = 1.0 - phi, a = viscous * phi, b = a + open;
+        const double chi = a - open + std::sqrt(b * b + 4.0 * open * inertial * std::abs(slip) * phi);  // 2 (1 - phi) chi
+        return plain_blend || phi >= 1.0 ? phi : chi / (2.0 * open + chi);
     }
 };
 
