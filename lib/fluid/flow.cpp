@@ -6,6 +6,7 @@
 
 #include "core/error.h"
 #include "core/parallel.h"
+#include "core/text.h"
 #include "fluid/detail/faces.h"
 #include "fluid/detail/lanes.h"
 #include "fluid/poisson.h"
@@ -81,13 +82,14 @@ Flow::Flow(const GridSpec& grid, const FlowOptions& options) : grid_(grid), layo
     if (!(options.density > 0.0)) throw UsageError("fluid.density", "is not positive", "water has 1000 kg/m3");
     if (!(options.kinematic_viscosity > 0.0))
         throw UsageError("fluid.kinematic_viscosity", "is not positive", "water has 1e-6 m2/s");
-    if (!(options.cfl > 0.0 && options.cfl <= 0.8))
-        throw UsageError("time.cfl", "is outside (0, 0.8]", "0.5 is a good choice");
+    if (!(options.cfl > 0.0 && options.cfl <= max_cfl(options.scheme)))
+        throw UsageError("time.cfl", "is outside (0, " + to_text(max_cfl(options.scheme)) + "]", "0.5 is a good choice");
     poisson_ = std::make_shared<const Poisson>(grid);
     for (int axis = 0; axis < 3; ++axis) {
         velocity_[axis] = layout_.make_field();
         provisional_[axis] = layout_.make_field();
         rate_[axis] = layout_.make_field();
+        if (options.scheme == TimeScheme::runge_kutta) start_[axis] = layout_.make_field(), held_[axis] = layout_.make_field();
     }
     pressure_ = layout_.make_field();
     work_ = poisson_->make_work();
@@ -101,6 +103,7 @@ void Flow::restart_history()
     fill_velocity_ghosts();
     fill_pressure_ghosts();
     for (Field& rate : rate_) std::fill(rate.begin(), rate.end(), 0.0);
+    for (Field& hold : held_) std::fill(hold.begin(), hold.end(), 0.0);
     flux_rate_.setZero();
     advective_sum_.setZero();
     pending_defect_.setZero();
@@ -113,10 +116,16 @@ void Flow::restart_history()
     step_limit_ = options_.first_step_factor * stable_time_step();
 }
 
+double max_cfl(TimeScheme scheme)
+{
+    return scheme == TimeScheme::runge_kutta ? 0.55 : 0.8;
+}
+
 double Flow::stable_time_step() const
 {
     const double h = grid_.cell;
-    const double limit = 1.5 * options_.cfl / (12.0 * options_.kinematic_viscosity / (h * h) + 1.5 * max_speed_ / h);
+    const double reach = options_.scheme == TimeScheme::runge_kutta ? runge_kutta_reach : 1.0;
+    const double limit = reach * 1.5 * options_.cfl / (12.0 * options_.kinematic_viscosity / (h * h) + 1.5 * max_speed_ / h);
     return std::min({limit, options_.max_time_step, step_limit_});
 }
 
@@ -370,7 +379,7 @@ FlowState Flow::save() const
     FlowState state;
     state.velocity = velocity_;
     state.pressure = pressure_;
-    state.previous_rate = rate_;
+    state.previous_rate = options_.scheme == TimeScheme::runge_kutta ? held_ : rate_;
     if (has_fines_) state.void_fraction = porous_.void_fraction;
     state.scalars = {previous_dt_, step_limit_, max_speed_, double(times_.steps)};
     for (const Eigen::Vector3d& v : {flux_rate_, advective_sum_, pending_defect_, momentum_.after})
@@ -387,7 +396,7 @@ void Flow::restore(const FlowState& state)
     if (!whole) throw Error("flow state", "belongs to another grid", "resume with the case that wrote it");
     velocity_ = state.velocity;
     pressure_ = state.pressure;
-    rate_ = state.previous_rate;
+    (options_.scheme == TimeScheme::runge_kutta ? held_ : rate_) = state.previous_rate;
     has_fines_ = !state.void_fraction.empty();
     if (has_fines_) porous_fields_for_writing().void_fraction = state.void_fraction;
     const double* s = state.scalars.data();

@@ -318,6 +318,8 @@ double force_faces(Flow& flow, const OwnFaces& faces, const Carrier& carrier)
     constexpr int a = (c + 1) % 3, b = (c + 2) % 3;
     double* us = flow.provisional(c).data();
     const double* eps = porous ? flow.porous_fields().void_fraction.data() : nullptr;
+    double* hold = flow.held_acceleration(c);
+    const double per_step = 1.0 / flow.step_length();
     const std::ptrdiff_t own = flow.layout().stride[c];
     const double slope = row_slope<c>(carrier);
     double impulse = 0.0;
@@ -329,6 +331,8 @@ double force_faces(Flow& flow, const OwnFaces& faces, const Carrier& carrier)
         double* row = us + run.at;
         const double *high = porous ? eps + run.at : nullptr, *low = porous ? high - own : nullptr;
         const int length = run.length;
+        if (hold)
+            for (int l = 0; l < length; ++l) hold[run.at + l] += per_step * (body + slope * l - row[l]);
         double sum = 0.0;
 #pragma omp simd reduction(+ : sum)
         for (int l = 0; l < length; ++l) {
@@ -351,6 +355,7 @@ double force_faces(Flow& flow, const OwnFaces& faces, const Carrier& carrier)
         const double solid = carrier.velocity[c] + carrier.spin[a] * rb - carrier.spin[b] * ra;
         const double change = double(faces.weight[std::size_t(n)]) * (solid - us[at[n]]);
         us[at[n]] += change;
+        if (hold) hold[at[n]] += per_step * change;
         sum += face_void<porous>(eps, own, at[n]) * change;
     }
     return impulse + sum;
@@ -492,6 +497,7 @@ void ImmersedBodies::apply(Flow& flow, std::span<const RigidMotion> motions)
             double& us = flow.provisional(c)[shared.at];
             const double change = shared.weight * (shared_velocity<c>(claims, carriers) - us);
             us += change;
+            if (double* hold = flow.held_acceleration(c)) hold[shared.at] += change / flow.step_length();
             const double given = flow.face_void_fraction(c, shared.at) * change;
             impulse[c] += given;
             for (const Claim& claim : claims) impulses_[claim.body][c] += mass * claim.part * given;

@@ -8,6 +8,7 @@
 #include "core/text.h"
 #include "dem/polyhedron.h"
 #include "fluid/drag.h"
+#include "fluid/flow.h"
 
 namespace coral::suffusion {
 
@@ -271,7 +272,10 @@ void read_time_and_output(const ConfigTable& root, Case& result)
     else result.time.duration = positive(time, "duration", Dimension::time);
     result.time.dem_step = time_or_word(time, "dem_step", "auto", 0);
     result.time.cfl = positive(time, "cfl", Dimension::number, result.time.cfl);
-    if (result.time.cfl > 0.8) time.error("cfl", "is " + to_text(result.time.cfl), "above 0.8 the flow step is not stable");
+    static const Strings flow_schemes{"auto", "adams-bashforth", "runge-kutta"};
+    result.time.flow_scheme = read_choice<FlowScheme>(time, "flow_scheme", flow_schemes, "auto");
+    const double most = fluid::max_cfl(result.time.flow_scheme == FlowScheme::runge_kutta ? fluid::TimeScheme::runge_kutta : fluid::TimeScheme::adams_bashforth);
+    if (result.time.cfl > most) time.error("cfl", "is " + to_text(result.time.cfl), "above " + to_text(most) + " the flow step is not stable");
     result.time.max_step = positive(time, "max_step", Dimension::time, result.time.max_step);
     result.output.interval = positive(output, "interval", Dimension::time, std::max(result.time.duration / 100, 1e-12));
     result.output.frames = time_or_word(output, "frames", "none", 0);

@@ -91,10 +91,13 @@ struct WallSpec {
     std::string material = "default";
 };
 
+enum class FlowScheme { automatic, adams_bashforth, runge_kutta };
+
 struct TimeSpec {
     double duration = 0;    ///< [s]
     double dem_step = 0;    ///< [s]; 0 is automatic
-    double cfl = 0.5;
+    double cfl = 0.5;       ///< of Adams-Bashforth; Runge-Kutta takes fluid::runge_kutta_reach times the step
+    FlowScheme flow_scheme = FlowScheme::automatic;  ///< automatic: Runge-Kutta where fines are coupled, their exchange costs more than two evaluations
     double max_step = 1e-3; ///< upper bound of the flow step [s]; start-up errors grow above it
 };
 

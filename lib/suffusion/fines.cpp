@@ -1,6 +1,9 @@
 #include "suffusion/fines.h"
 
+#include <algorithm>
 #include <cmath>
+#include <functional>
+#include <limits>
 
 #include "core/parallel.h"
 
@@ -9,6 +12,10 @@ namespace coral::suffusion {
 using Eigen::Vector3d;
 
 namespace {
+
+// Farthest move in a flow step [cells; docs/numerics.md]. One fine in a thousand may be faster: squeezed between grains it shoots out for a millisecond.
+constexpr double fine_cells = 0.3, outlier_cells = 1.0;
+constexpr std::size_t outlier_share = 1000;
 
 fluid::KernelOptions kernel_options(const FluidSpec& spec)
 {
@@ -118,12 +125,17 @@ void Fines::learn(double dt, const Scene& scene)
     }
 }
 
-double Fines::max_speed(const Scene& scene) const
+double Fines::longest_step(const Scene& scene, double cell) const
 {
-    double fastest = 0;
+    std::vector<double> speeds;
+    speeds.reserve(all_.size());
     for (const int id : all_)
-        if (scene.world.active(id)) fastest = std::max(fastest, scene.world.velocity(id).norm());
-    return fastest;
+        if (scene.world.active(id)) speeds.push_back(scene.world.velocity(id).norm());
+    if (speeds.empty()) return std::numeric_limits<double>::infinity();
+    const auto most = speeds.begin() + static_cast<std::ptrdiff_t>(speeds.size() / outlier_share);
+    std::nth_element(speeds.begin(), most, speeds.end(), std::greater<>());
+    const double fastest = *std::max_element(speeds.begin(), most + 1);
+    return cell * std::min(fine_cells / *most, outlier_cells / fastest);
 }
 
 }  // namespace coral::suffusion

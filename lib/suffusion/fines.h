@@ -30,7 +30,8 @@ public:
     Eigen::Vector3d drag_impulse() const { return drag_impulse_; }          ///< on the bodies, last step [N s]
     Eigen::Vector3d pressure_impulse() const { return pressure_impulse_; }  ///< on the bodies, last step [N s]
     double mean_felt_void_fraction() const { return mean_felt_; }
-    double max_speed(const Scene& scene) const;  ///< [m/s]
+    /// Flow step in which fines move no farther than the coupling stands [s].
+    double longest_step(const Scene& scene, double cell) const;
 
     const std::vector<Eigen::Vector3d>& other_acceleration() const { return other_; }
     void restore(std::vector<Eigen::Vector3d> forces, std::vector<Eigen::Vector3d> other) { forces_ = std::move(forces), other_ = std::move(other); }

@@ -10,6 +10,7 @@
 #include "core/parallel.h"
 #include "core/text.h"
 #include "core/units.h"
+#include "fluid/flow.h"
 #include "suffusion/scene.h"
 
 namespace coral::suffusion {
@@ -18,6 +19,7 @@ namespace {
 
 // Cost of one step, measured with suffuse on one core of a shared two-core machine: the paper's case and the small studies (docs/validation/flow-speed.md).
 constexpr double seconds_per_cell = 1.1e-7;        ///< fluid step, per cell
+constexpr double seconds_per_stage_cell = 3.7e-8;  ///< each evaluation of convection beyond the first, per cell
 constexpr double seconds_per_solid_cell = 9e-8;    ///< placing and forcing resolved grains, per cell in them
 constexpr double seconds_per_fine = 4e-5;          ///< kernel gather and spread, per fine and fluid step, at support 2d/4d and 2 to 6 cells per diameter
 constexpr double seconds_per_grain_contact = 9e-7; ///< contact step, per grain
@@ -106,7 +108,8 @@ void predict(Plan& plan, const pack::Sample& sample)
 {
     const double dx = plan.domain.cell, nu = FluidSpec{}.kinematic_viscosity;
     const double speed = pore_speed_ratio * plan.options.velocity;
-    plan.flow_step = std::min(TimeSpec{}.max_step, 1 / (15 * nu / (dx * dx) + speed / (dx * TimeSpec{}.cfl)));
+    const bool staged = plan.populations[1].count > 0 && plan.populations[1].scheme != Scheme::resolved;
+    plan.flow_step = std::min(TimeSpec{}.max_step, (staged ? fluid::runge_kutta_reach : 1) / (15 * nu / (dx * dx) + speed / (dx * TimeSpec{}.cfl)));
     double lightest = std::numeric_limits<double>::infinity();
     for (const pack::Particle& p : sample.particles) lightest = std::min(lightest, pack::mass(sample, p));
     double stiffest = 0;
@@ -124,7 +127,7 @@ void predict(Plan& plan, const pack::Sample& sample)
     double solid_cells = 0;
     for (const pack::Particle& p : sample.particles)
         if (p.role == pack::Role::coarse) solid_cells += std::numbers::pi / 6 * std::pow(pack::equivalent_diameter(sample, p) / dx, 3);
-    const double flow = cells * seconds_per_cell + solid_cells * seconds_per_solid_cell + fines * seconds_per_fine;
+    const double flow = cells * (seconds_per_cell + (staged ? 2 * seconds_per_stage_cell : 0)) + solid_cells * seconds_per_solid_cell + fines * seconds_per_fine;
     plan.run_time = (plan.flow_steps * flow + plan.dem_steps * grains * seconds_per_grain_contact) / speed_up;
 }
 

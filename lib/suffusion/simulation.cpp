@@ -1,5 +1,6 @@
 #include "suffusion/simulation.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/error.h"
@@ -13,16 +14,32 @@ using Eigen::Vector3d;
 
 namespace {
 
-constexpr double grain_cells = 0.1, fine_cells = 0.3;  ///< farthest move in a flow step [cells; docs/numerics.md]
+constexpr double grain_cells = 0.1;                    ///< farthest move of a grain in a flow step [cells; docs/numerics.md]
 constexpr int dry_substeps = 256;                      ///< contact steps between two looks at the outside
 constexpr double speed_bound = 1e3;                    ///< [m/s]: beyond it a run has blown up
 
-fluid::FlowOptions flow_options(const Case& c)
+bool has_coupled_fines(const Scene& scene)
 {
+    return std::any_of(scene.bodies.begin(), scene.bodies.end(), [](const BodyInfo& body) { return body.scheme != Scheme::resolved; });
+}
+
+fluid::TimeScheme flow_scheme(const Scene& scene)
+{
+    using fluid::TimeScheme;
+    const TimeSpec& time = scene.description.time;
+    if (time.flow_scheme == FlowScheme::adams_bashforth || time.cfl > fluid::max_cfl(TimeScheme::runge_kutta)) return TimeScheme::adams_bashforth;
+    const bool pays = has_coupled_fines(scene);
+    return time.flow_scheme == FlowScheme::runge_kutta || pays ? TimeScheme::runge_kutta : TimeScheme::adams_bashforth;
+}
+
+fluid::FlowOptions flow_options(const Scene& scene)
+{
+    const Case& c = scene.description;
     fluid::FlowOptions options;
     options.density = c.fluid->density;
     options.kinematic_viscosity = c.fluid->kinematic_viscosity;
     options.body_acceleration = c.fluid->body_acceleration;
+    options.scheme = flow_scheme(scene);
     options.cfl = c.time.cfl;
     options.max_time_step = c.time.max_step;
     return options;
@@ -53,7 +70,7 @@ Simulation::Simulation(std::unique_ptr<Scene> scene) : scene_(std::move(scene))
     if (!std::isfinite(dem_step_)) dem_step_ = c.time.duration / dry_substeps;  // nothing moves freely
     if (!c.fluid) return;
     const fluid::GridSpec grid = grid_of(c);
-    flow_.emplace(grid, flow_options(c));
+    flow_.emplace(grid, flow_options(*scene_));
     if (c.fluid->initial_velocity.norm() > 0) flow_->set_velocity([&](const Vector3d&, int axis) { return c.fluid->initial_velocity[axis]; });
     grains_.emplace(*scene_, grid);
     grains_->place(*scene_);
@@ -85,9 +102,9 @@ double Simulation::next_flow_step(double remaining) const
 {
     double dt = flow_->stable_time_step();
     const double cell = scene_->description.domain->cell;
-    const double grain_speed = grains_->max_speed(*scene_), fine_speed = fines_->max_speed(*scene_);
+    const double grain_speed = grains_->max_speed(*scene_);
     if (grain_speed > 0) dt = std::min(dt, grain_cells * cell / grain_speed);
-    if (fine_speed > 0) dt = std::min(dt, fine_cells * cell / fine_speed);
+    dt = std::min(dt, fines_->longest_step(*scene_, cell));
     if (dt < 1e-9 * scene_->description.time.max_step)
         throw Error("t = " + to_text(time_) + " s", "the flow step collapsed to " + to_text(dt) + " s",
                     "look at the last frame; a lower cfl, a finer dem_step or softer contacts may help");

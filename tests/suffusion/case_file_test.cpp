@@ -131,6 +131,14 @@ TEST(CaseFile, reports_all_errors_at_once_with_the_nearest_key)
     EXPECT_NE(error.find("case.toml:12:"), std::string::npos) << error;
 }
 
+TEST(CaseFile, knows_how_far_each_flow_scheme_may_step)
+{
+    EXPECT_EQ(error_of(replaced(whole, "cfl = 0.5", "cfl = 0.55\nflow_scheme = \"runge-kutta\"")), "");
+    EXPECT_NE(error_of(replaced(whole, "cfl = 0.5", "cfl = 0.7\nflow_scheme = \"runge-kutta\"")).find("above 0.55 the flow step is not stable"), std::string::npos);
+    EXPECT_EQ(error_of(replaced(whole, "cfl = 0.5", "cfl = 0.7")), "");
+    EXPECT_NE(error_of(replaced(whole, "cfl = 0.5", "flow_scheme = \"runge-kuta\"")).find("adams-bashforth"), std::string::npos);
+}
+
 TEST(CaseFile, names_the_inlet_that_is_closed)
 {
     for (const char* velocity : {"[0, 0, 0]", "[0, 0, 0.1]", "[0.1, 0, 0]"}) {
