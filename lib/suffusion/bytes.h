@@ -31,6 +31,9 @@ public:
         array<double>(std::span<const double>(values.empty() ? nullptr : values.front().data(), 3 * values.size()));
     }
     const std::vector<std::uint8_t>& bytes() const { return bytes_; }
+    /// The bytes, of which none are left here.
+    std::vector<std::uint8_t> take() { return std::move(bytes_); }
+    void reserve(std::size_t size) { bytes_.reserve(size); }
 
 private:
     void append(const void* data, std::size_t size)

@@ -1,5 +1,6 @@
 #include "suffusion/flow_region.h"
 
+#include "core/parallel.h"
 #include "morph/components.h"
 
 namespace coral::suffusion {
@@ -33,39 +34,61 @@ bool RegionFinder::SealedVoids::contains(const Vector3d& point) const
     return false;
 }
 
-void RegionFinder::mark(const Simulation& simulation, int body, const ApparentShape& apparent, const SealedVoids& voids, std::vector<Region>& regions) const
-{
-    const dem::World& world = simulation.scene().world;
-    const DomainSpec& domain = *simulation.scene().description.domain;
-    const Vector3d x = world.position(body);
-    const Eigen::Matrix3d turn = world.orientation(body).conjugate().toRotationMatrix() / world.scale(body);  // domain -> frame of the shape
-    const double reach = world.bounding_radius(body) / domain.cell + 1;
-    const Vector3i first = ((x - domain.origin).array() / domain.cell - reach).floor().cast<int>().max(0);
-    const Vector3i last = ((x - domain.origin).array() / domain.cell + reach).ceil().cast<int>().min(domain.cells.array() - 1);
-    const std::size_t row = static_cast<std::size_t>(domain.cells.x()), layer = row * static_cast<std::size_t>(domain.cells.y());
-    for (int k = first.z(); k <= last.z(); ++k)
-        for (int j = first.y(); j <= last.y(); ++j)
-            for (int i = first.x(); i <= last.x(); ++i) {
-                const Vector3d centre = turn * (simulation.flow().cell_centre(i, j, k) - x);
-                if (!apparent.contains(centre)) continue;
-                bool deep = true;  // and not solid: thin walls are solid by less than half of a cell
-                for (int axis = 0; axis < 3 && deep; ++axis)
-                    deep = apparent.contains(centre + domain.cell * turn.col(axis)) && apparent.contains(centre - domain.cell * turn.col(axis));
-                Region& region = regions[static_cast<std::size_t>(i) + row * static_cast<std::size_t>(j) + layer * static_cast<std::size_t>(k)];
-                const bool open = deep && world.shape(body).distance_grid().sample(centre) > 0;
-                region = std::max(region, !open ? Region::surface : voids.contains(centre) ? Region::sealed : Region::open);
-            }
-}
+/// A grain with voids, as the cells of the flow see it.
+struct RegionFinder::Placed {
+    const ApparentShape& apparent;
+    const SealedVoids& voids;
+    const sdf::DistanceGrid& solid;
+    Vector3d position;
+    Eigen::Matrix3d turn;  ///< domain -> frame of the shape
+    Vector3i first, last;  ///< cells that it may reach
+};
 
-std::vector<Region> RegionFinder::find(const Simulation& simulation) const
+std::vector<RegionFinder::Placed> RegionFinder::place(const Simulation& simulation) const
 {
     const Scene& scene = simulation.scene();
-    std::vector<Region> regions(simulation.flow().grid().cell_count(), Region::between);
+    const DomainSpec& domain = *scene.description.domain;
+    std::vector<Placed> grains;
     for (std::size_t g = 0; g < scene.bodies.size(); ++g) {
         const int body = static_cast<int>(g);
-        if (!scene.bodies[g].apparent || !scene.world.active(body)) continue;
-        mark(simulation, body, *scene.bodies[g].apparent, voids_.at(scene.world.shape_id(body)), regions);
+        const dem::World& world = scene.world;
+        if (!scene.bodies[g].apparent || !world.active(body)) continue;
+        const Vector3d x = world.position(body), at = (x - domain.origin) / domain.cell;
+        const double reach = world.bounding_radius(body) / domain.cell + 1;
+        grains.push_back({*scene.bodies[g].apparent, voids_.at(world.shape_id(body)), world.shape(body).distance_grid(), x,
+                          world.orientation(body).conjugate().toRotationMatrix() / world.scale(body), (at.array() - reach).floor().cast<int>().max(0),
+                          (at.array() + reach).ceil().cast<int>().min(domain.cells.array() - 1)});
     }
+    return grains;
+}
+
+void RegionFinder::mark_plane(const Simulation& simulation, const Placed& grain, int k, double least_open, std::vector<Region>& regions) const
+{
+    const DomainSpec& domain = *simulation.scene().description.domain;
+    const std::size_t row = static_cast<std::size_t>(domain.cells.x()), layer = row * static_cast<std::size_t>(domain.cells.y());
+    for (int j = grain.first.y(); j <= grain.last.y(); ++j)
+        for (int i = grain.first.x(); i <= grain.last.x(); ++i) {
+            if (1 - simulation.solid_fraction(simulation.flow().layout().index(i, j, k)) < least_open) continue;
+            const Vector3d centre = grain.turn * (simulation.flow().cell_centre(i, j, k) - grain.position);
+            if (!grain.apparent.contains(centre)) continue;
+            bool deep = true;  // and not solid: thin walls are solid by less than half of a cell
+            for (int axis = 0; axis < 3 && deep; ++axis)
+                deep = grain.apparent.contains(centre + domain.cell * grain.turn.col(axis)) && grain.apparent.contains(centre - domain.cell * grain.turn.col(axis));
+            Region& region = regions[static_cast<std::size_t>(i) + row * static_cast<std::size_t>(j) + layer * static_cast<std::size_t>(k)];
+            const bool open = deep && grain.solid.sample(centre) > 0;
+            region = std::max(region, !open ? Region::surface : grain.voids.contains(centre) ? Region::sealed : Region::open);
+        }
+}
+
+std::vector<Region> RegionFinder::find(const Simulation& simulation, double least_open) const
+{
+    std::vector<Region> regions(simulation.flow().grid().cell_count(), Region::between);
+    const std::vector<Placed> grains = place(simulation);
+    parallel_blocks(static_cast<std::size_t>(simulation.flow().grid().cells.z()), 1, [&](std::size_t plane, std::size_t) {
+        const int k = static_cast<int>(plane);
+        for (const Placed& grain : grains)
+            if (grain.first.z() <= k && k <= grain.last.z()) mark_plane(simulation, grain, k, least_open, regions);
+    });
     return regions;
 }
 

@@ -23,8 +23,9 @@ public:
     explicit RegionFinder(const Scene& scene);
 
     /// Region of every cell, x fastest, solid or not. A cell counts by its centre, and as deep when the six points one cell off
-    /// its centre along the axes lie in the apparent shape of the same grain as well. \pre simulation.has_flow()
-    std::vector<Region> find(const Simulation& simulation) const;
+    /// its centre along the axes lie in the apparent shape of the same grain as well. Cells that are open by less than `least_open`
+    /// of their volume are not looked at and count as between. \pre simulation.has_flow()
+    std::vector<Region> find(const Simulation& simulation, double least_open = 0) const;
 
 private:
     /// Sealed nodes of the lattice of a shape.
@@ -35,7 +36,9 @@ private:
         std::vector<std::uint8_t> sealed;
         bool contains(const Eigen::Vector3d& point) const;
     };
-    void mark(const Simulation& simulation, int body, const ApparentShape& apparent, const SealedVoids& voids, std::vector<Region>& regions) const;
+    struct Placed;
+    std::vector<Placed> place(const Simulation& simulation) const;
+    void mark_plane(const Simulation& simulation, const Placed& grain, int k, double least_open, std::vector<Region>& regions) const;
 
     std::map<int, SealedVoids> voids_;  ///< by shape of the world
 };

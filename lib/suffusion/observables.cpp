@@ -186,7 +186,8 @@ void Observer::record_flow_split(const Simulation& simulation)
     const Scene& scene = simulation.scene();
     const DomainSpec& domain = *scene.description.domain;
     const Eigen::Vector3i& cells = domain.cells;
-    const std::vector<Region> regions = regions_->find(simulation);
+    constexpr double least_open = 0.5;
+    const std::vector<Region> regions = regions_->find(simulation, least_open);
     const bool sample = !scene.bodies.empty();
     using Sums = Eigen::Array<double, 6, 1>;  // of speed and of weight: between grains, in open voids, in sealed ones
     const Sums total = parallel_sum(static_cast<std::size_t>(cells.z()), 1, Sums::Zero().eval(), [&](std::size_t k, std::size_t) {
@@ -197,7 +198,7 @@ void Observer::record_flow_split(const Simulation& simulation)
         for (int j = 0; j < cells.y(); ++j)
             for (int i = 0; i < cells.x(); ++i, ++n) {
                 const double open = 1 - simulation.solid_fraction(flow.layout().index(i, j, static_cast<int>(k)));
-                if (open < 0.5 || regions[n] == Region::surface) continue;
+                if (open < least_open || regions[n] == Region::surface) continue;
                 const int part = regions[n] == Region::between ? 0 : regions[n] == Region::open ? 2 : 4;
                 sum[part] += open * flow.cell_velocity(i, j, static_cast<int>(k)).norm();
                 sum[part + 1] += open;

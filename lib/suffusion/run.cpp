@@ -24,6 +24,7 @@ using Clock = std::chrono::steady_clock;
 
 constexpr double results_seconds = 10;  ///< wall time between rewrites of results.h5, at least
 constexpr double writing_share = 0.05;  ///< of the wall time may go into rewrites
+constexpr double keeping_share = 0.02;  ///< of the wall time may go into copies of the state
 
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
@@ -57,6 +58,7 @@ private:
     void start_or_resume();
     void resume(const Checkpoint& checkpoint);
     void loop(RunSummary& summary);
+    void keep_state();
     void at_event();
     void write_results_now();
     void write_checkpoint_now(const std::vector<std::uint8_t>& state);
@@ -66,13 +68,14 @@ private:
     RunOptions options_;
     fs::path folder_, results_file_, checkpoint_file_;
     Clock::time_point start_ = Clock::now(), last_checkpoint_ = start_, last_results_ = start_;
-    double checkpoint_cost_ = 0, results_cost_ = 0;
+    Clock::time_point last_kept_ = start_;
+    double checkpoint_cost_ = 0, results_cost_ = 0, keeping_cost_ = 0;
     Simulation simulation_;
     Observer observer_;
     FrameWriter frames_;
     Schedule output_, frame_;
     std::vector<Measure> earlier_;             ///< performance of the parts before a resume
-    std::vector<std::uint8_t> last_good_;      ///< state at the last output
+    std::vector<std::uint8_t> last_good_;      ///< state at one of the last outputs
     std::vector<std::uint8_t> last_observer_;
     std::size_t last_rows_ = 0, last_frames_ = 0;
 };
@@ -154,16 +157,26 @@ void Run::write_checkpoint_now(const std::vector<std::uint8_t>& state)
     simulation_.timing().output += seconds_since(begin);
 }
 
+/// Copies the state of this output for stop_on_error(); not that of every one, where copying takes more than its share of the time.
+void Run::keep_state()
+{
+    if (!last_good_.empty() && seconds_since(last_kept_) < keeping_cost_ / keeping_share) return;
+    const Clock::time_point begin = Clock::now();
+    last_good_ = simulation_.save();
+    last_observer_ = observer_.save();
+    last_rows_ = observer_.results().rows();
+    last_frames_ = frames_.count();
+    last_kept_ = Clock::now();
+    keeping_cost_ = seconds_since(begin);
+}
+
 void Run::at_event()
 {
     const Clock::time_point begin = Clock::now();
     const double time = simulation_.time();
     if (output_.due(time) || time >= simulation_.scene().description.time.duration) observer_.record(simulation_);
     if (frame_.due(time)) frames_.write(simulation_);
-    last_good_ = simulation_.save();
-    last_observer_ = observer_.save();
-    last_rows_ = observer_.results().rows();
-    last_frames_ = frames_.count();
+    keep_state();
     simulation_.timing().output += seconds_since(begin);
     if (seconds_since(last_results_) > std::max(results_seconds, results_cost_ / writing_share)) write_results_now();
 }
@@ -188,7 +201,7 @@ void Run::loop(RunSummary& summary)
     progress.finish();
 }
 
-/// Leaves what was good: the results, and a checkpoint of the last output.
+/// Leaves what was good: the results, and a checkpoint of the last output whose state was kept.
 void Run::stop_on_error()
 {
     if (last_good_.empty()) return;

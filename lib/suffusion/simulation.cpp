@@ -254,8 +254,9 @@ std::vector<std::uint8_t> Simulation::save() const
     out.number(balance_.mass), out.number(balance_.momentum);
     out.array<std::uint8_t>(eroded_);
     out.array<std::uint8_t>(scene_->world.save());
-    if (!flow_) return out.bytes();
+    if (!flow_) return out.take();
     const fluid::FlowState state = flow_->save();
+    out.reserve(2 * out.bytes().size() + 8 * sizeof(double) * state.pressure.size());  // what follows the fields is less than what is before them
     for (int axis = 0; axis < 3; ++axis) out.array<double>(state.velocity[axis]), out.array<double>(state.previous_rate[axis]);
     out.array<double>(state.pressure), out.array<double>(state.void_fraction), out.array<double>(state.scalars);
     std::vector<double> poses;
@@ -266,7 +267,7 @@ std::vector<std::uint8_t> Simulation::save() const
     out.array<double>(poses);
     for (const std::vector<Vector3d>& part : grains_->state()) out.vectors(part);
     out.vectors(fines_->forces()), out.vectors(fines_->other_acceleration());
-    return out.bytes();
+    return out.take();
 }
 
 void Simulation::restore(std::span<const std::uint8_t> state)
