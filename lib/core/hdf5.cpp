@@ -42,8 +42,8 @@ Id string_type(std::size_t length)
     return {type, H5Tclose};
 }
 
-/// Large arrays go in chunks of about 64k elements along the first axis.
-Id creation_list(const std::vector<std::size_t>& dims)
+/// Large arrays go in chunks of about 64k elements along the first axis. What is not deflated has checksums, so that damage shows.
+Id creation_list(const std::vector<std::size_t>& dims, bool deflate)
 {
     const hid_t list = H5Pcreate(H5P_DATASET_CREATE);
     H5Pset_obj_track_times(list, 0);
@@ -54,8 +54,12 @@ Id creation_list(const std::vector<std::size_t>& dims)
         std::size_t row = count / dims[0];
         chunk[0] = std::clamp<hsize_t>(65536 / std::max<std::size_t>(row, 1), 1, dims[0]);
         H5Pset_chunk(list, static_cast<int>(chunk.size()), chunk.data());
-        H5Pset_shuffle(list);
-        H5Pset_deflate(list, 4);
+        if (deflate) {
+            H5Pset_shuffle(list);
+            H5Pset_deflate(list, 4);
+        } else {
+            H5Pset_fletcher32(list);
+        }
     }
     return {list, H5Pclose};
 }
@@ -77,6 +81,7 @@ struct H5File::Impl {
     std::filesystem::path path;
     std::unique_ptr<OutputFile> output;  ///< set while a new file is being written
     hid_t file = -1;
+    bool deflate = true;
 
     ~Impl() { close(); }
     const std::filesystem::path& file_on_disk() const { return output ? output->temporary() : path; }
@@ -159,7 +164,7 @@ struct H5File::Impl {
         const std::vector<hsize_t> sizes(shape.begin(), shape.end());
         const Id space(H5Screate_simple(static_cast<int>(sizes.size()), sizes.data(), nullptr), H5Sclose);
         if (const std::size_t slash = object.rfind('/'); slash != std::string::npos) make_groups(object.substr(0, slash));
-        const Id list = creation_list(shape);
+        const Id list = creation_list(shape, deflate);
         const Id dataset(H5Dcreate2(file, object.c_str(), type, space, H5P_DEFAULT, list, H5P_DEFAULT), H5Dclose);
         if (!dataset.valid() || (count > 0 && H5Dwrite(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, data) < 0)) fail(object, "could not be written");
     }
@@ -252,6 +257,7 @@ void H5File::make_group(const std::string& path)
     if (!impl_->exists(path)) impl_->make_groups(path);
 }
 
+void H5File::set_deflate(bool deflate) { impl_->deflate = deflate; }
 void H5File::write(const std::string& path, std::span<const double> data, std::vector<std::size_t> dims) { impl_->write(path, data.data(), data.size(), H5T_NATIVE_DOUBLE, dims); }
 void H5File::write(const std::string& path, std::span<const float> data, std::vector<std::size_t> dims) { impl_->write(path, data.data(), data.size(), H5T_NATIVE_FLOAT, dims); }
 void H5File::write(const std::string& path, std::span<const std::int64_t> data, std::vector<std::size_t> dims) { impl_->write(path, data.data(), data.size(), H5T_NATIVE_INT64, dims); }

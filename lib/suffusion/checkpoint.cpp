@@ -12,6 +12,7 @@ void write_checkpoint(const std::filesystem::path& file, const Checkpoint& check
 {
     H5File h5 = H5File::create(file);
     h5.set_format(file_format::checkpoint);
+    h5.set_deflate(false);
     h5.set_attribute("/", "time", checkpoint.time);
     h5.set_attribute("/", "rows", static_cast<std::int64_t>(checkpoint.rows));
     h5.set_attribute("/", "frames", static_cast<std::int64_t>(checkpoint.frames));

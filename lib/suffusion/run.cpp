@@ -23,7 +23,7 @@ namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
 constexpr double results_seconds = 10;  ///< wall time between rewrites of results.h5, at least
-constexpr double writing_share = 0.05;  ///< of the wall time may go into rewrites
+constexpr double writing_share = 0.02;  ///< of the wall time may go into rewrites, of results and of checkpoints each
 constexpr double keeping_share = 0.02;  ///< of the wall time may go into copies of the state
 
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
