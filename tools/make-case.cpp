@@ -28,6 +28,7 @@ void declare(coral::cli::Options& options, Options& o)
     options.quantity("--velocity", o.plan.velocity, Dimension::velocity, "Flow at the inlet, downwards");
     options.quantity("--angle", o.plan.angle, Dimension::angle, "Between flow and gravity (gravity is turned)");
     options.quantity("--hole", o.plan.hole, Dimension::length, "Edge of the filter's square holes; 0: 0.4 of the smallest coarse grain");
+    options.quantity("--pitch", o.plan.pitch, Dimension::length, "Distance of their centres, made to divide the sample's width; 0: two edges");
     options.quantity("--cell", o.plan.cell, Dimension::length, "Edge of the flow cells; 0: a thirtieth of the smallest coarse grain");
     options.add("--lid", o.lid, "Upper wall of the packing: keep (holds the grains, water passes), or remove (a compressed sample springs up)").one_of({"keep", "remove"});
     options.quantity("--duration", o.plan.duration, Dimension::time, "Length of the run");

@@ -85,7 +85,8 @@ void lay_out(Plan& plan)
     plan.domain.size = plan.domain.cells.cast<double>() * cell;
     plan.domain.origin = {0, -0.5 * (plan.domain.size.y() - plan.sample_size.y()), -(below - 0.25) * cell};
     plan.plate_thickness = 2 * cell;
-    const double holes = std::max(1.0, std::round(plan.sample_size.x() / (2 * plan.options.hole)));
+    const double wanted = plan.options.pitch > 0 ? plan.options.pitch : 2 * plan.options.hole;
+    const double holes = std::max(1.0, std::round(plan.sample_size.x() / wanted));
     plan.pitch = plan.sample_size.x() / holes;
     plan.plate_open_fraction = std::pow(plan.options.hole / plan.pitch, 2);
 }
@@ -182,6 +183,10 @@ Plan make_plan(const pack::Sample& sample, const PlanOptions& options)
     if (!(plan.options.cell > 0) || plan.options.cell > width / 8)
         throw UsageError("--cell", "is " + to_text(plan.options.cell) + " m", "give an edge above zero and at most an eighth of the sample's width, " + to_text(width) + " m");
     lay_out(plan);
+    const double narrowest = plan.options.hole + 1.5 * plan.domain.cell;
+    if (plan.options.pitch != 0 && !(plan.options.pitch > 0 && plan.pitch >= narrowest))
+        throw UsageError("--pitch", "is " + to_text(plan.options.pitch) + " m, for a sample of this width " + to_text(plan.pitch) + " m",
+                         "give at least the hole and one and a half cells beside it, " + to_text(narrowest) + " m");
     check_period(plan);
     plan.populations = {population_of(sample, pack::Role::coarse, plan.domain.cell), population_of(sample, pack::Role::fine, plan.domain.cell)};
     plan.gravity = 9.81 * Eigen::Vector3d(std::sin(options.angle), 0, -std::cos(options.angle));

@@ -14,6 +14,7 @@ struct PlanOptions {
     double velocity = 0.1;  ///< of the flow downwards at the inlet, superficial [m/s]
     double angle = 0;       ///< between flow and gravity [rad]: gravity is turned about y, the flow stays along -z
     double hole = 0;        ///< edge of the filter holes [m]; 0: 0.4 of the smallest coarse diameter (6 mm for 15 mm grains)
+    double pitch = 0;       ///< distance of their centres, made to divide the sample's width [m]; 0: two edges (a quarter of the plate is open)
     double cell = 0;        ///< [m]; 0: a thirtieth of the smallest coarse diameter (0.5 mm for 15 mm grains)
     double duration = 2;    ///< [s]
     /// Whether the upper wall of the packing stays, as the perforated plate of an oedometer: for grains only, water passes. Without it a

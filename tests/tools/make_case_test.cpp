@@ -37,6 +37,21 @@ pack::Sample small_sample(bool with_fines)
     return sample;
 }
 
+TEST(MakeCase, sets_the_holes_as_far_apart_as_asked)
+{
+    const ScratchFolder folder;
+    pack::write_sample(small_sample(true), folder.path() / "sample.h5");
+    const double width = small_sample(true).size.x();
+    const ProgramResult made = run_program("make-case sample.h5 -o case --hole 4mm --pitch 6.2mm --cell 1mm", folder.path());
+    ASSERT_EQ(made.exit_code, 0) << made.err;
+    const double pitch = suffusion::read_case(folder.path() / "case").plate()->pitch;
+    EXPECT_NEAR(pitch, width / std::round(width / 6.2e-3), 1e-12);
+    const ProgramResult refused = run_program("make-case sample.h5 -o narrow --hole 4mm --pitch 4.5mm --cell 1mm", folder.path());
+    EXPECT_EQ(refused.exit_code, 2);
+    EXPECT_NE(refused.err.find("--pitch"), std::string::npos) << refused.err;
+    EXPECT_FALSE(std::filesystem::exists(folder.path() / "narrow"));
+}
+
 TEST(MakeCase, writes_a_case_that_reads_back_and_runs)
 {
     const ScratchFolder folder;
