@@ -384,23 +384,29 @@ FlowState Flow::save() const
     state.scalars = {previous_dt_, step_limit_, max_speed_, double(times_.steps)};
     for (const Eigen::Vector3d& v : {flux_rate_, advective_sum_, pending_defect_, momentum_.after})
         state.scalars.insert(state.scalars.end(), v.data(), v.data() + 3);
+    state.scalars.push_back(double(options_.scheme));
     return state;
 }
 
 void Flow::restore(const FlowState& state)
 {
     const auto fits = [&](const Field& f) { return f.size() == layout_.total; };
-    bool whole = fits(state.pressure) && state.scalars.size() == 16 &&
+    const std::size_t scalars = state.scalars.size();  // states of before there were two schemes have one less
+    bool whole = fits(state.pressure) && (scalars == 16 || scalars == 17) &&
                  (state.void_fraction.empty() || fits(state.void_fraction));
     for (int axis = 0; axis < 3; ++axis) whole = whole && fits(state.velocity[axis]) && fits(state.previous_rate[axis]);
     if (!whole) throw Error("flow state", "belongs to another grid", "resume with the case that wrote it");
     velocity_ = state.velocity;
     pressure_ = state.pressure;
-    (options_.scheme == TimeScheme::runge_kutta ? held_ : rate_) = state.previous_rate;
+    const bool same_scheme = double(options_.scheme) == (scalars == 17 ? state.scalars.back() : 0.0);
+    std::array<Field, 3>& history = options_.scheme == TimeScheme::runge_kutta ? held_ : rate_;
+    if (same_scheme) history = state.previous_rate;
+    else
+        for (Field& f : history) std::fill(f.begin(), f.end(), 0.0);
     has_fines_ = !state.void_fraction.empty();
     if (has_fines_) porous_fields_for_writing().void_fraction = state.void_fraction;
     const double* s = state.scalars.data();
-    previous_dt_ = s[0], step_limit_ = s[1], times_.steps = std::uint64_t(s[3]);
+    previous_dt_ = same_scheme ? s[0] : 0.0, step_limit_ = s[1], times_.steps = std::uint64_t(s[3]);
     const double speed = s[2];
     s += 4;
     momentum_ = MomentumTally{};

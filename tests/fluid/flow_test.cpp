@@ -202,7 +202,15 @@ TEST(Flow, continues_bit_for_bit_from_a_saved_state)
         EXPECT_EQ(flow.pressure(), other.pressure());
         EXPECT_EQ(flow.momentum().relative_error(), other.momentum().relative_error());
     }
-    const Flow flow(open_channel(0, 1, 0.1), liquid(1e-5));
+    Flow flow(open_channel(0, 1, 0.1), liquid(1e-5));
+    for (int step = 0; step < 7; ++step) flow.step(flow.stable_time_step());
+    Flow of_other_scheme(open_channel(0, 1, 0.1), liquid(1e-5, TimeScheme::runge_kutta));
+    of_other_scheme.restore(flow.save());
+    for (int step = 0; step < 7; ++step) {
+        of_other_scheme.step(of_other_scheme.stable_time_step());
+        EXPECT_LT(of_other_scheme.mass().relative_error(), 1e-12);
+        EXPECT_LT(of_other_scheme.momentum().relative_error(), 1e-10);
+    }
     Flow small(box({4, 4, 4}, 0.01, BoundaryKind::slip, BoundaryKind::slip, BoundaryKind::slip), liquid(1e-5));
     EXPECT_THROW(small.restore(flow.save()), coral::Error);
 }
