@@ -30,7 +30,7 @@ public:
     std::vector<std::string> members(const std::string& group) const;
     void make_group(const std::string& path);
 
-    /// Whether large arrays written from now on are deflated (the default), or only checksummed: ten times as quick for what is soon overwritten.
+    /// Whether large arrays written from now on are deflated (the default), or only checksummed: quicker, for what is soon overwritten.
     void set_deflate(bool deflate);
     /// Row-major data of the given dimensions; groups on the way are made. Large arrays are chunked, shuffled and deflated.
     void write(const std::string& path, std::span<const double> data, std::vector<std::size_t> dims);

@@ -212,7 +212,7 @@ private:
     template <Convection convection>
     void sweep_all(const Stage& stage);
     void sweep(const Stage& stage);
-    void start_next_stage(bool first);
+    void start_next_stage();
     void run_stages(double dt);
     template <bool porous, Convection convection>
     Eigen::Vector3d boundary_flux_rate() const;

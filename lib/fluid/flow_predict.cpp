@@ -168,9 +168,8 @@ void Flow::sweep(const Stage& stage)
 }
 
 /// Makes the provisional velocity the one that the next stage starts from.
-void Flow::start_next_stage(bool first)
+void Flow::start_next_stage()
 {
-    if (first) start_.swap(velocity_);
     velocity_.swap(provisional_);
     fill_velocity_ghosts();
 }
@@ -190,9 +189,10 @@ void Flow::run_stages(double dt)
     // Wray's low-storage scheme (Spalart, Moser & Rogers 1991, J. Comput. Phys. 96, appendix A)
     const double first = 8.0 / 15.0 * dt, second = 2.0 / 15.0 * dt;
     sweep({first, 0.0, first, first});
-    start_next_stage(true);
+    start_.swap(velocity_);
+    start_next_stage();
     sweep({5.0 / 12.0 * dt, 17.0 / 60.0 * dt, second, second});
-    start_next_stage(false);
+    start_next_stage();
     sweep({3.0 / 4.0 * dt, 5.0 / 12.0 * dt, dt / 3.0, -(first + second)});
     velocity_.swap(start_);
     if (has_fines_) return;  // apply_fines writes every face

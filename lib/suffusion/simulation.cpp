@@ -27,9 +27,9 @@ fluid::TimeScheme flow_scheme(const Scene& scene)
 {
     using fluid::TimeScheme;
     const TimeSpec& time = scene.description.time;
-    if (time.flow_scheme == FlowScheme::adams_bashforth || time.cfl > fluid::max_cfl(TimeScheme::runge_kutta)) return TimeScheme::adams_bashforth;
-    const bool pays = has_coupled_fines(scene);
-    return time.flow_scheme == FlowScheme::runge_kutta || pays ? TimeScheme::runge_kutta : TimeScheme::adams_bashforth;
+    bool staged = time.flow_scheme == FlowScheme::runge_kutta;
+    if (time.flow_scheme == FlowScheme::automatic) staged = has_coupled_fines(scene) && time.cfl <= fluid::max_cfl(TimeScheme::runge_kutta);
+    return staged ? TimeScheme::runge_kutta : TimeScheme::adams_bashforth;
 }
 
 fluid::FlowOptions flow_options(const Scene& scene)
