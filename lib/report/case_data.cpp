@@ -96,6 +96,18 @@ void read_trapped(const H5File& file, CaseData& data)
     data.notes.push_back("/trapped of results.h5 has columns of different length and was left out.");
 }
 
+/// How the throats that fines came through (or cannot leave by) compare with them.
+void compare_throats(const H5File& file, CaseData& data)
+{
+    if (!file.exists("/trapped/throat")) return;
+    const std::vector<double> throat = file.read_doubles("/trapped/throat");
+    const std::vector<std::int64_t>& fine = data.trapped.fine;
+    for (std::size_t k = 0; k < std::min(throat.size(), fine.size()); ++k) {
+        const auto body = static_cast<std::size_t>(fine[k]);
+        if (body < data.bodies.size() && data.bodies[body].diameter > 0) data.trapped.way_out.push_back(throat[k] / data.bodies[body].diameter);
+    }
+}
+
 /// Every number below a group as one line, sub-groups with their names in front.
 void read_performance(const H5File& file, const std::string& group, const std::string& prefix, CaseData& data)
 {
@@ -155,6 +167,7 @@ CaseData read_case(const fs::path& folder)
     data.sample.clear();
     if (fs::is_regular_file(sample)) detail::read_sample(sample, data);
     else if (named_sample) data.notes.push_back("The sample " + sample.filename().string() + " that the case names is not there.");
+    compare_throats(file, data);
     return data;
 }
 

@@ -45,6 +45,7 @@ struct Migration {
 struct TrappedFines {
     std::vector<std::int64_t> fine, grain;  ///< body numbers
     std::vector<std::int64_t> enclosed;     ///< 1 when the whole fine is inside, 0 in the mouth of a void
+    std::vector<double> way_out;            ///< width of the widest throat on the way out / diameter of the fine; of those for which both are known
 };
 
 /// A body as drawn: `shape` is the template k of `/shapes/<k>` in sample.h5, or -1 for a sphere that case.toml describes.

@@ -202,6 +202,7 @@ std::vector<Figure> make_figures(const std::vector<CaseData>& runs)
     figures.push_back(detail::fine_paths(cases));
     figures.push_back(detail::fine_speeds(cases));
     figures.push_back(detail::trapped_by_grain(cases));
+    figures.push_back(detail::trapped_by_throat(cases));
     figures.push_back(detail::gradation(cases));
     figures.push_back(detail::stability_table(cases));
     for (Figure& figure : figures) keep_drawable(figure);

@@ -1,10 +1,12 @@
 // Figures of single fines: how far they came, on which paths, where they are trapped. Numbers in brackets are those of Huang et al.
 #include <algorithm>
+#include <array>
 #include <functional>
 #include <map>
 #include <numeric>
 
 #include "report/detail/figures.h"
+#include "report/summary.h"
 
 namespace coral::report::detail {
 namespace {
@@ -188,6 +190,32 @@ Figure trapped_by_grain(const std::vector<CaseData>& cases)
                 if (data.trapped.grain[k] == grain) all += 1, inside += static_cast<double>(data.trapped.enclosed[k]);
             if (all > 0) figure.table.add({data.name, static_cast<double>(at), static_cast<double>(grain), all, inside});
         }
+    return figure;
+}
+
+Figure trapped_by_throat(const std::vector<CaseData>& cases)
+{
+    constexpr std::array ends{0.5, 0.75, 0.9, 1.0, 1.1, 1.25, 1.5, 2.0};  // of the bins
+    Figure figure;
+    figure.name = "trapped_by_throat";
+    figure.title = "Trapped fines by throat";
+    figure.caption = "Fines in voids at the end, by the narrowest place of their widest way out over their diameter: left of 1 the void holds them, right of 1 they could leave. "
+                     "Throats are read off the lattice up to one spacing too narrow.";
+    figure.kind = FigureKind::bars;
+    figure.x_column = "place";
+    figure.x_label = "throat / diameter of the fine";
+    figure.table.columns = {"case", "place", "above", "below", "count"};
+    figure.panels = {{"", "trapped fines [count]", 1, false, {{"count", "trapped", {}, {}, {}}}, {}}};
+    for (std::size_t k = 0; k <= ends.size(); ++k)
+        figure.categories.push_back(k == 0 ? "< " + short_number(ends[0]) : k == ends.size() ? "> " + short_number(ends.back()) : short_number(ends[k - 1]) + "-" + short_number(ends[k]));
+    for (const CaseData& data : cases) {
+        if (data.trapped.way_out.empty()) continue;
+        std::array<double, ends.size() + 1> count{};
+        for (const double ratio : data.trapped.way_out) count[static_cast<std::size_t>(std::ranges::upper_bound(ends, ratio) - ends.begin())] += 1;
+        for (std::size_t k = 0; k < count.size(); ++k)
+            figure.table.add({data.name, static_cast<double>(k), k == 0 ? 0.0 : ends[k - 1], k == ends.size() ? Cell(std::string()) : Cell(ends[k]),
+                              count[k] / static_cast<double>(data.repeats)});
+    }
     return figure;
 }
 

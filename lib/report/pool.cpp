@@ -74,6 +74,7 @@ CaseData pool(const std::vector<const CaseData*>& runs)
         const Migration& more = runs[k]->migration;
         append(pooled.migration.path_length, more.path_length);
         append(pooled.migration.layer, more.layer);
+        append(pooled.trapped.way_out, runs[k]->trapped.way_out);
     }
     return pooled;
 }

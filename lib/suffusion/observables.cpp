@@ -146,7 +146,7 @@ void Observer::record_trapping(const Simulation& simulation)
     std::vector<std::int64_t> here;
     for (const std::int64_t id : results_.fines)
         if (!simulation.eroded(static_cast<std::size_t>(id))) here.push_back(id);
-    trapped_ = find_trapped(simulation.scene(), here, simulation.time(), trapped_);
+    trapped_ = find_trapped(simulation.scene(), here, simulation.time(), trapped_, throats_);
     put("trapped_count", "1", static_cast<double>(trapped_.size()));
     put("trapped_enclosed", "1", static_cast<double>(std::ranges::count(trapped_, true, &Trapped::enclosed)));
     put("trapped_entered", "1", static_cast<double>(std::ranges::count_if(trapped_, [](const Trapped& t) { return t.since > 0; })));
@@ -351,6 +351,10 @@ void Observer::resume(Results stored, std::size_t rows, std::span<const std::uin
         results_.cloggings[n] = motion_[n].cloggings();
     }
     results_.eroded = std::move(stored.eroded);
+    // Where the file is of this very output, it knows the throats, which are no part of the state.
+    for (Trapped& t : trapped_)
+        for (const Trapped& known : stored.trapped)
+            if (known.fine == t.fine && known.grain == t.grain) t.throat = known.throat;
     results_.trapped = trapped_;
 }
 

@@ -54,6 +54,7 @@ private:
     std::vector<MotionState> motion_;                   ///< in the same order
     std::optional<RegionFinder> regions_;               ///< with flow
     std::vector<Trapped> trapped_;                      ///< at the last output
+    ThroatLibrary throats_;
     double last_time_ = 0;                              ///< of the last output [s]
 };
 

@@ -28,12 +28,13 @@ Column read_column(const H5File& h5, const std::string& group, const std::string
 void write_trapped(H5File& h5, const std::vector<Trapped>& trapped)
 {
     std::vector<std::int64_t> fine, grain, enclosed;
-    std::vector<double> since;
+    std::vector<double> since, throat;
     for (const Trapped& t : trapped) {
         fine.push_back(t.fine);
         grain.push_back(t.grain);
         enclosed.push_back(t.enclosed);
         since.push_back(t.since);
+        throat.push_back(t.throat);
     }
     const std::size_t n = trapped.size();
     h5.write("/trapped/fine", std::span<const std::int64_t>(fine), {n});
@@ -41,6 +42,8 @@ void write_trapped(H5File& h5, const std::vector<Trapped>& trapped)
     h5.write("/trapped/enclosed", std::span<const std::int64_t>(enclosed), {n});
     h5.write("/trapped/since", std::span<const double>(since), {n});
     h5.set_attribute("/trapped/since", "unit", "s");
+    h5.write("/trapped/throat", std::span<const double>(throat), {n});
+    h5.set_attribute("/trapped/throat", "unit", "m");
 }
 
 std::vector<Trapped> read_trapped(const H5File& h5)
@@ -48,10 +51,12 @@ std::vector<Trapped> read_trapped(const H5File& h5)
     if (!h5.exists("/trapped/fine")) return {};
     const auto fine = h5.read_integers("/trapped/fine"), grain = h5.read_integers("/trapped/grain"), enclosed = h5.read_integers("/trapped/enclosed");
     const auto since = h5.read_doubles("/trapped/since");
-    if (grain.size() != fine.size() || enclosed.size() != fine.size() || since.size() != fine.size())
+    // Results of before have no throats; a run that goes on finds them at its next output.
+    const auto throat = h5.exists("/trapped/throat") ? h5.read_doubles("/trapped/throat") : std::vector<double>(fine.size(), 0.0);
+    if (grain.size() != fine.size() || enclosed.size() != fine.size() || since.size() != fine.size() || throat.size() != fine.size())
         throw Error(h5.path().string() + ":/trapped", "has columns of different length", "run suffuse again");
     std::vector<Trapped> trapped;
-    for (std::size_t i = 0; i < fine.size(); ++i) trapped.push_back({fine[i], grain[i], enclosed[i] != 0, since[i]});
+    for (std::size_t i = 0; i < fine.size(); ++i) trapped.push_back({fine[i], grain[i], enclosed[i] != 0, since[i], throat[i]});
     return trapped;
 }
 

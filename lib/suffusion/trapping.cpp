@@ -23,7 +23,7 @@ bool encloses(const ApparentShape& apparent, const Vector3d& centre, double radi
 
 }  // namespace
 
-std::vector<Trapped> find_trapped(const Scene& scene, const std::vector<std::int64_t>& fines, double time, const std::vector<Trapped>& before)
+std::vector<Trapped> find_trapped(const Scene& scene, const std::vector<std::int64_t>& fines, double time, const std::vector<Trapped>& before, ThroatLibrary& throats)
 {
     std::vector<std::size_t> hollow;
     for (std::size_t g = 0; g < scene.bodies.size(); ++g)
@@ -40,7 +40,7 @@ std::vector<Trapped> find_trapped(const Scene& scene, const std::vector<std::int
             const ApparentShape& apparent = *scene.bodies[g].apparent;
             if (!apparent.contains(local)) continue;
             const double radius = 0.5 * scene.bodies[static_cast<std::size_t>(fine)].diameter;
-            Trapped trapped{fine, static_cast<std::int64_t>(g), encloses(apparent, local, radius / scale), time};
+            Trapped trapped{fine, static_cast<std::int64_t>(g), encloses(apparent, local, radius / scale), time, throats.width(scene.world, body, r, radius)};
             const auto known = std::ranges::find_if(before, [&](const Trapped& t) { return t.fine == trapped.fine && t.grain == trapped.grain; });
             if (known != before.end()) trapped.since = known->since;
             now.push_back(trapped);

@@ -49,6 +49,30 @@ TEST(ErosionTable, starts_with_case_time_and_eroded_mass_and_holds_every_series)
     EXPECT_EQ(std::get<std::string>(table.rows[0][k]), "");
 }
 
+TEST(Figures, sort_trapped_fines_by_the_width_of_their_way_out)
+{
+    const ScratchFolder scratch;
+    auto cases = two_cases(scratch);
+    const auto throats = [&] {
+        const auto figures = make_figures(cases);
+        const auto it = std::ranges::find(figures, "trapped_by_throat", &Figure::name);
+        return it == figures.end() ? Figure() : *it;
+    };
+    EXPECT_TRUE(throats().table.rows.empty());
+    cases[0].trapped.way_out = {0, 0.95, 1.0, 1.05, 3.0};
+    const Figure figure = throats();
+    ASSERT_EQ(figure.table.rows.size(), figure.categories.size());
+    const auto count = [&](const std::string& bin) {
+        const auto k = static_cast<std::size_t>(std::ranges::find(figure.categories, bin) - figure.categories.begin());
+        return std::get<double>(figure.table.rows.at(k).back());
+    };
+    EXPECT_EQ(count("< 0.5"), 1);
+    EXPECT_EQ(count("0.9-1"), 1);
+    EXPECT_EQ(count("1-1.1"), 2);
+    EXPECT_EQ(count("> 2"), 1);
+    EXPECT_EQ(count("0.5-0.75"), 0);
+}
+
 TEST(Figures, of_a_full_case_answer_those_of_the_paper)
 {
     const ScratchFolder scratch;

@@ -16,6 +16,7 @@
 #include "suffusion/run.h"
 #include "suffusion/scratch.h"
 #include "suffusion/slices.h"
+#include "suffusion/throats.h"
 
 namespace coral::suffusion {
 namespace {
@@ -270,6 +271,28 @@ TEST(Trapping, tells_the_fine_inside_from_the_one_in_the_mouth_and_the_one_besid
     EXPECT_EQ(r.trapped[1].fine, 2);
     EXPECT_FALSE(r.trapped[1].enclosed);
     EXPECT_EQ(r.trapped[0].grain, 0);
+    EXPECT_NEAR(r.trapped[0].throat, 1.2e-3, 2e-4);  // the bore, to a spacing
+    EXPECT_GE(r.trapped[1].throat, r.trapped[0].throat);
+}
+
+TEST(Trapping, knows_the_way_out_of_a_void_by_its_narrowest_place)
+{
+    const Scratch scratch;
+    const Vector3d origin = Vector3d::Zero();
+    const auto throats_of = [&](double mouth) {
+        write_shell(scratch.path() / "shell.vdb", 4e-3, 1e-3, mouth);
+        return Throats(sdf::GrainReader(scratch.path() / "shell.vdb").read(1).solid);
+    };
+    EXPECT_EQ(throats_of(0).width(origin, 5e-4), 0);
+    const double spacing = 2e-4;
+    for (const double mouth : {0.3e-3, 0.45e-3, 0.8e-3, 1.2e-3}) {
+        const Throats throats = throats_of(mouth);
+        const double width = throats.width(origin, 5e-4);
+        EXPECT_LT(width, 2 * mouth + 0.05 * spacing) << mouth;
+        EXPECT_GT(width, 2 * mouth - 1.05 * spacing) << mouth;
+        EXPECT_EQ(throats.width({0, 0, -2e-3}, 1e-3), width) << "at the wall";
+        EXPECT_GT(throats.width({0, 0, 4.2e-3}, 2e-3), 2 * mouth) << "outside the mouth";
+    }
 }
 
 TEST(Trapping, dates_a_fine_that_comes_in_later)

@@ -26,7 +26,7 @@ Results two_rows()
     r.eroded = {0};
     r.state = {2};
     r.cloggings = {3};
-    r.trapped = {{7, 0, true, 0.25}};
+    r.trapped = {{7, 0, true, 0.25, 1.2e-3}};
     r.performance = {{"seconds_contact", "s", 1.5}};
     r.history = "[]";
     r.case_text = "a = 1\n";
@@ -55,6 +55,7 @@ TEST(Results, come_back_as_they_were_written)
     EXPECT_EQ(r.trapped[0].fine, 7);
     EXPECT_TRUE(r.trapped[0].enclosed);
     EXPECT_EQ(r.trapped[0].since, 0.25);
+    EXPECT_EQ(r.trapped[0].throat, 1.2e-3);
     EXPECT_EQ(r.performance.at(0).value, 1.5);
     EXPECT_EQ(r.case_text, "a = 1\n");
 }

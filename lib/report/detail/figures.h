@@ -30,5 +30,6 @@ std::vector<Figure> migration_figures(const std::vector<CaseData>& cases);
 Figure fine_paths(const std::vector<CaseData>& cases);
 Figure fine_speeds(const std::vector<CaseData>& cases);
 Figure trapped_by_grain(const std::vector<CaseData>& cases);
+Figure trapped_by_throat(const std::vector<CaseData>& cases);
 
 }  // namespace coral::report::detail
