@@ -157,8 +157,11 @@ ShapeTemplate unit_sphere();
 /// \throws Error when it cannot be written, or when an index of the sample points nowhere
 void write_sample(const Sample& sample, const std::filesystem::path& file);
 
+/// What is read of a sample: the lattices with voids filled take as much memory as those of the solid, and contact and flow do without.
+enum class SampleDetail { all, without_apparent_grids };
+
 /// Reads sample.h5 back bit for bit; checks sizes, indices and finite numbers before it believes them.
 /// \throws Error naming file and dataset
-Sample read_sample(const std::filesystem::path& file);
+Sample read_sample(const std::filesystem::path& file, SampleDetail detail = SampleDetail::all);
 
 }  // namespace coral::pack

@@ -223,7 +223,7 @@ void read_superellipsoid(const Reader& in, const std::string& group, ShapeTempla
     shape.exponents = {exponents[0], exponents[1]};
 }
 
-ShapeTemplate read_shape(const Reader& in, const std::string& group)
+ShapeTemplate read_shape(const Reader& in, const std::string& group, SampleDetail detail)
 {
     const H5File& file = in.file();
     ShapeTemplate shape;
@@ -244,7 +244,7 @@ ShapeTemplate read_shape(const Reader& in, const std::string& group)
     if (shape.kind == ShapeKind::polyhedron) shape.vertices = read_vertices(in, group);
     else shape.grid = read_grid(in, group + "/distance");
     if (shape.kind == ShapeKind::superellipsoid) read_superellipsoid(in, group, shape);
-    if (file.exists(group + "/apparent_distance")) shape.apparent_grid = read_grid(in, group + "/apparent_distance");
+    if (detail == SampleDetail::all && file.exists(group + "/apparent_distance")) shape.apparent_grid = read_grid(in, group + "/apparent_distance");
     const std::size_t count = in.count(group + "/nodes");
     const auto nodes = in.numbers(group + "/nodes", count, 3);
     for (std::size_t i = 0; i < count; ++i) shape.nodes.push_back(row3(nodes, i));
@@ -381,7 +381,7 @@ void write_sample(const Sample& sample, const std::filesystem::path& path)
     file.commit();
 }
 
-Sample read_sample(const std::filesystem::path& path)
+Sample read_sample(const std::filesystem::path& path, SampleDetail detail)
 {
     const H5File file = H5File::open(path);
     const Reader in(file);
@@ -398,7 +398,7 @@ Sample read_sample(const std::filesystem::path& path)
         if (period.size() != 3 || !(*std::min_element(period.begin(), period.end()) >= 0)) in.fail("/", "attribute period needs three lengths");
         sample.period = row3(period, 0);
     }
-    for (const std::string& k : file.members("/shapes")) sample.shapes.push_back(read_shape(in, "/shapes/" + k));
+    for (const std::string& k : file.members("/shapes")) sample.shapes.push_back(read_shape(in, "/shapes/" + k, detail));
     read_materials(file, sample);
     read_particles(in, sample);
     read_walls(in, sample);

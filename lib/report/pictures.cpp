@@ -46,7 +46,7 @@ pack::Sample sample_at(const CaseData& data, pack::Sample sample, std::size_t st
 void draw_sample(const CaseData& data, const std::string& stem, const fs::path& folder, std::vector<NamedPicture>& pictures)
 {
     if (data.sample.empty() || data.tracks.position.empty() || data.tracks.time.empty()) return;
-    const pack::Sample sample = pack::read_sample(data.sample);
+    const pack::Sample sample = pack::read_sample(data.sample, pack::SampleDetail::without_apparent_grids);
     for (const bool after : {false, true}) {
         const std::size_t step = after ? data.tracks.time.size() - 1 : 0;
         const std::string file = stem + (after ? "_after.png" : "_before.png");

@@ -17,7 +17,7 @@ int main(int count, char** values)
     }
     const int steps = count > 2 ? std::atoi(values[2]) : 2000;
     set_thread_count(count > 3 ? std::atoi(values[3]) : 1);
-    const pack::Sample sample = pack::read_sample(values[1]);
+    const pack::Sample sample = pack::read_sample(values[1], pack::SampleDetail::without_apparent_grids);
     dem::WorldOptions options;
     options.gravity = sample.gravity;
     const std::string_view scheme = count > 4 ? values[4] : "automatic";

@@ -95,6 +95,7 @@ TEST(SampleFile, comes_back_bit_for_bit)
     const auto file = scratch("sample.h5");
     write_sample(s, file);
     const Sample t = read_sample(file);
+    for (const ShapeTemplate& shape : read_sample(file, SampleDetail::without_apparent_grids).shapes) EXPECT_FALSE(shape.apparent_grid);
     EXPECT_EQ(t.size, s.size);
     EXPECT_EQ(t.gravity, s.gravity);
     ASSERT_EQ(t.shapes.size(), s.shapes.size());

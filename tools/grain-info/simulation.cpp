@@ -15,7 +15,7 @@ namespace coral::grain_info {
 
 Report describe_sample(const std::filesystem::path& file)
 {
-    const pack::Sample sample = pack::read_sample(file);
+    const pack::Sample sample = pack::read_sample(file, pack::SampleDetail::without_apparent_grids);
     Report report("packed sample (pack-sample)");
     std::vector<double> coarse, fine;
     for (const pack::Particle& p : sample.particles) (p.role == pack::Role::fine ? fine : coarse).push_back(pack::equivalent_diameter(sample, p));
