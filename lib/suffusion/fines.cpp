@@ -32,10 +32,8 @@ fluid::KernelOptions kernel_options(const FluidSpec& spec)
 
 Fines::Fines(const Scene& scene, const fluid::GridSpec& grid)
     : density_(scene.description.fluid->density), viscosity_(scene.description.fluid->kinematic_viscosity),
-      law_(fluid::drag_law_from_name(scene.description.fluid->drag)), corner_(grid.origin), kernel_(grid, kernel_options(*scene.description.fluid))
+      law_(fluid::drag_law_from_name(scene.description.fluid->drag)), kernel_(grid, kernel_options(*scene.description.fluid))
 {
-    for (int axis = 0; axis < 3; ++axis)
-        if (grid.periodic(axis)) period_[axis] = grid.size()[axis];
     for (std::size_t i = 0; i < scene.bodies.size(); ++i)
         if (scene.bodies[i].scheme != Scheme::resolved) all_.push_back(static_cast<int>(i));
     total_ = all_.size();
@@ -58,11 +56,8 @@ void Fines::collect(const Scene& scene)
             forces_[static_cast<std::size_t>(id)].setZero();
             continue;
         }
-        Vector3d x = scene.world.position(id);
-        for (int axis = 0; axis < 3; ++axis)
-            if (period_[axis] > 0) x[axis] -= period_[axis] * std::floor((x[axis] - corner_[axis]) / period_[axis]);
         ids_.push_back(id);
-        positions_.push_back(x);
+        positions_.push_back(scene.wrapped(scene.world.position(id)));
         velocities_.push_back(scene.world.velocity(id));
         diameters_.push_back(scene.bodies[static_cast<std::size_t>(id)].diameter);
         volumes_.push_back(scene.bodies[static_cast<std::size_t>(id)].volume);

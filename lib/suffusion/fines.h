@@ -43,7 +43,6 @@ private:
 
     double density_, viscosity_;
     fluid::DragLaw law_;
-    Eigen::Vector3d period_ = Eigen::Vector3d::Zero(), corner_;
     fluid::FineCoupling kernel_;
     std::map<int, Outline> outlines_;  ///< by shape of the world; empty where the drag law knows spheres only
     std::size_t total_ = 0;

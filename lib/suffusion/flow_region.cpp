@@ -49,15 +49,23 @@ std::vector<RegionFinder::Placed> RegionFinder::place(const Simulation& simulati
     const Scene& scene = simulation.scene();
     const DomainSpec& domain = *scene.description.domain;
     std::vector<Placed> grains;
+    const Vector3d period = scene.period();
     for (std::size_t g = 0; g < scene.bodies.size(); ++g) {
         const int body = static_cast<int>(g);
         const dem::World& world = scene.world;
         if (!scene.bodies[g].apparent || !world.active(body)) continue;
-        const Vector3d x = world.position(body), at = (x - domain.origin) / domain.cell;
+        const Eigen::Matrix3d turn = world.orientation(body).conjugate().toRotationMatrix() / world.scale(body);
         const double reach = world.bounding_radius(body) / domain.cell + 1;
-        grains.push_back({*scene.bodies[g].apparent, voids_.at(world.shape_id(body)), world.shape(body).distance_grid(), x,
-                          world.orientation(body).conjugate().toRotationMatrix() / world.scale(body), (at.array() - reach).floor().cast<int>().max(0),
-                          (at.array() + reach).ceil().cast<int>().min(domain.cells.array() - 1)});
+        // A grain at a periodic face comes in at the other one as well.
+        const Vector3i images = (period.array() > 0).cast<int>();
+        for (int k = -images.z(); k <= images.z(); ++k)
+            for (int j = -images.y(); j <= images.y(); ++j)
+                for (int i = -images.x(); i <= images.x(); ++i) {
+                    const Vector3d x = scene.wrapped(world.position(body)) + period.cwiseProduct(Vector3d(i, j, k)), at = (x - domain.origin) / domain.cell;
+                    const Vector3i first = (at.array() - reach).floor().cast<int>().max(0), last = (at.array() + reach).ceil().cast<int>().min(domain.cells.array() - 1);
+                    if ((first.array() > last.array()).any()) continue;
+                    grains.push_back({*scene.bodies[g].apparent, voids_.at(world.shape_id(body)), world.shape(body).distance_grid(), x, turn, first, last});
+                }
     }
     return grains;
 }

@@ -39,24 +39,22 @@ fluid::BodyShape flow_shape(const dem::Shape& shape, double scale)
 }
 
 /// Pose of a body that has left: beyond the low side of an axis that does not wrap.
-fluid::RigidMotion far_away(const fluid::GridSpec& grid)
+fluid::RigidMotion far_away(const DomainSpec& domain)
 {
     fluid::RigidMotion motion;
-    motion.position = grid.origin - 100 * grid.size();
+    motion.position = domain.origin - 100 * domain.size;
     return motion;
 }
 
 }  // namespace
 
 Grains::Grains(const Scene& scene, const fluid::GridSpec& grid)
-    : density_(scene.description.fluid->density), corner_(grid.origin), immersed_(grid, [] {
+    : density_(scene.description.fluid->density), immersed_(grid, [] {
           fluid::ForcingOptions options;
           options.reshape_distance = reshape_cells;
           return options;
       }())
 {
-    for (int axis = 0; axis < 3; ++axis)
-        if (grid.periodic(axis)) period_[axis] = grid.size()[axis];
     for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
         if (scene.bodies[i].scheme != Scheme::resolved) continue;
         const int id = static_cast<int>(i);
@@ -81,19 +79,15 @@ Grains::Grains(const Scene& scene, const fluid::GridSpec& grid)
     torques_ = forces_;
 }
 
-fluid::RigidMotion Grains::motion_of(const Scene& scene, int body) const
+fluid::RigidMotion Grains::motion_of(const Scene& scene, int body)
 {
-    fluid::RigidMotion motion{scene.world.position(body), scene.world.orientation(body), scene.world.velocity(body), scene.world.angular_velocity(body)};
-    for (int axis = 0; axis < 3; ++axis)
-        if (period_[axis] > 0) motion.position[axis] -= period_[axis] * std::floor((motion.position[axis] - corner_[axis]) / period_[axis]);
-    return motion;
+    return {scene.wrapped(scene.world.position(body)), scene.world.orientation(body), scene.world.velocity(body), scene.world.angular_velocity(body)};
 }
 
 void Grains::collect_motions(const Scene& scene)
 {
     for (std::size_t b = 0; b < bodies_.size(); ++b)
-        motions_[b] = scene.world.active(bodies_[b]) ? motion_of(scene, bodies_[b])
-                                                     : far_away({.cells = scene.description.domain->cells, .cell = scene.description.domain->cell, .origin = corner_});
+        motions_[b] = scene.world.active(bodies_[b]) ? motion_of(scene, bodies_[b]) : far_away(*scene.description.domain);
     if (motions_.size() > bodies_.size()) motions_.back() = plate_;
 }
 

@@ -38,11 +38,10 @@ public:
     void restore(std::array<std::vector<Eigen::Vector3d>, 4> state);
 
 private:
-    fluid::RigidMotion motion_of(const Scene& scene, int body) const;
+    static fluid::RigidMotion motion_of(const Scene& scene, int body);
     void collect_motions(const Scene& scene);
 
     double density_;
-    Eigen::Vector3d period_ = Eigen::Vector3d::Zero(), corner_;
     fluid::ImmersedBodies immersed_;
     std::vector<int> bodies_;  ///< world ids; the plate follows them in immersed_
     std::vector<fluid::RigidMotion> motions_;

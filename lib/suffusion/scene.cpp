@@ -139,17 +139,40 @@ void find_extent(Scene& scene)
     if (const WallSpec* plate = scene.description.plate()) scene.lower.z() = std::max(scene.lower.z(), plate->z);
 }
 
-dem::World make_world(const Case& c)
+dem::World make_world(const Case& c, const Eigen::Vector3d& period)
 {
     dem::WorldOptions options;
     options.gravity = c.gravity;
     options.sphere_scheme = c.sphere_scheme;
-    for (int axis = 0; axis < 3; ++axis)
-        if (c.domain && c.boundary[2 * axis].kind == BoundaryKind::periodic) options.period[axis] = c.domain->size[axis];
+    options.period = period;
     return dem::World(options);
 }
 
 }  // namespace
+
+Eigen::Vector3d Scene::period() const
+{
+    Eigen::Vector3d period = Eigen::Vector3d::Zero();
+    for (int axis = 0; axis < 3; ++axis)
+        if (description.domain && description.boundary[2 * axis].kind == BoundaryKind::periodic) period[axis] = description.domain->size[axis];
+    return period;
+}
+
+Eigen::Vector3d Scene::wrapped(Eigen::Vector3d x) const
+{
+    const Eigen::Vector3d length = period();
+    for (int axis = 0; axis < 3; ++axis)
+        if (length[axis] > 0) x[axis] -= length[axis] * std::floor((x[axis] - description.domain->origin[axis]) / length[axis]);
+    return x;
+}
+
+Eigen::Vector3d Scene::nearest_image(Eigen::Vector3d r) const
+{
+    const Eigen::Vector3d length = period();
+    for (int axis = 0; axis < 3; ++axis)
+        if (length[axis] > 0) r[axis] -= length[axis] * std::nearbyint(r[axis] / length[axis]);
+    return r;
+}
 
 Eigen::Vector2d Scene::hole_centre() const
 {
@@ -173,9 +196,9 @@ std::string_view to_string(Scheme scheme)
 std::unique_ptr<Scene> build_scene(Case description)
 {
     auto scene = std::make_unique<Scene>(std::move(description));
-    scene->world = make_world(scene->description);
+    scene->world = make_world(scene->description, scene->period());
     std::optional<pack::Sample> sample;
-    if (scene->description.sample) sample = pack::read_sample(*scene->description.sample);
+    if (scene->description.sample) sample = pack::read_sample(*scene->description.sample, pack::SampleDetail::without_apparent_grids);
     if (sample && !scene->description.overrides_material) {
         const pack::Material& m = sample->materials.at(0);
         scene->description.materials["default"] = {m.density, m.normal_stiffness, m.tangential_stiffness, m.friction, m.damping};

@@ -33,6 +33,12 @@ struct Scene {
     Eigen::Vector3d lower = Eigen::Vector3d::Zero(), upper = Eigen::Vector3d::Zero();  ///< box around the grains at the start [m]
     History history;  ///< of the sample; the caller adds its own entry
     bool has_plate() const { return description.plate() != nullptr; }
+    /// Lengths of the domain between periodic faces, 0 along other axes [m].
+    Eigen::Vector3d period() const;
+    /// The image of a place that lies in the domain; positions of bodies go on beyond its periodic faces.
+    Eigen::Vector3d wrapped(Eigen::Vector3d x) const;
+    /// The shortest of all images of a difference of places.
+    Eigen::Vector3d nearest_image(Eigen::Vector3d r) const;
     /// Centre of one hole of the plate [m]: half a pitch from the lower corner of the domain.
     Eigen::Vector2d hole_centre() const;
 };

@@ -59,7 +59,7 @@ int slice_row(const Simulation& simulation)
     const Vector3d middle = domain.origin + 0.5 * domain.size;
     double y = middle.y(), nearest = HUGE_VAL;
     for (std::size_t g = 0; g < scene.bodies.size(); ++g) {
-        const Vector3d& x = scene.world.position(static_cast<int>(g));
+        const Vector3d x = scene.wrapped(scene.world.position(static_cast<int>(g)));
         if (!scene.bodies[g].apparent || (x - middle).norm() >= nearest) continue;
         nearest = (x - middle).norm();
         y = x.y();

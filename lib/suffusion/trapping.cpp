@@ -33,7 +33,7 @@ std::vector<Trapped> find_trapped(const Scene& scene, const std::vector<std::int
         const Vector3d& x = scene.world.position(static_cast<int>(fine));
         for (const std::size_t g : hollow) {
             const int body = static_cast<int>(g);
-            const Vector3d r = x - scene.world.position(body);
+            const Vector3d r = scene.nearest_image(x - scene.world.position(body));
             if (r.squaredNorm() > std::pow(scene.world.bounding_radius(body), 2)) continue;
             const double scale = scene.world.scale(body);
             const Vector3d local = scene.world.orientation(body).conjugate() * r / scale;

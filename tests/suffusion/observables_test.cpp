@@ -295,6 +295,25 @@ TEST(Trapping, knows_the_way_out_of_a_void_by_its_narrowest_place)
     }
 }
 
+TEST(Trapping, and_the_flow_in_voids_know_the_images_of_a_grain_at_a_periodic_face)
+{
+    const Scratch scratch;
+    write_shell(scratch.path() / "shell.vdb", 4e-3, 1e-3, 0.6e-3);
+    const auto run_at = [&](double x) {
+        const Vector3d c(x, 0.008, 0.012);
+        return run(scratch, walls + "cell = 0.0005\n[boundary]\n\"x-\" = { type = \"periodic\" }\n\"x+\" = { type = \"periodic\" }\n[fluid]\n" + shell_at(c) +
+                                ball(1e-3, {std::fmod(x + 0.0155, 0.016), 0.008, 0.013}, "role = \"fine\"\nmotion = \"fixed\"") +
+                                "[time]\nduration = 0.001\n[output]\ninterval = 0.001\n");
+    };
+    const Results middle = run_at(0.008);
+    EXPECT_EQ(last(middle, "trapped_enclosed"), 1);
+    for (const double x : {0.0, 0.0165}) {
+        const Results seam = run_at(x);
+        EXPECT_EQ(last(seam, "trapped_enclosed"), 1) << x;
+        EXPECT_NEAR(last(seam, "intraparticle_volume"), last(middle, "intraparticle_volume"), 1e-12) << x;
+    }
+}
+
 TEST(Trapping, dates_a_fine_that_comes_in_later)
 {
     const Scratch scratch;
