@@ -12,7 +12,7 @@ include $(dir $(lastword $(MAKEFILE_LIST)))common.mk
 #:   SCALE_TO    diameter all grains are scaled to     SPACING   of the level sets
 #:   DEGREE      of the spherical harmonics
 #:   SPEC        packing (docs/pack-spec.md), default pipeline/specs/demo.toml
-#:   VELOCITY    of the inflow        ANGLE     between flow and gravity        HOLE   edge of the filter's holes
+#:   VELOCITY    of the inflow        ANGLE     between flow and gravity        HOLE   edge of the filter's holes, PITCH apart
 #:   CELL        of the flow grid     DURATION  simulated time
 #:   SEED        of the packing       THREADS   of every tool
 #:   OUT         folder of all results, default build/curves
@@ -28,7 +28,7 @@ endif
 csct2ls := $(bin)/csct2ls '$(stack)' $(stack_options) $(threads)
 ls2sh := $(bin)/ls2sh $(out)/grains.vdb $(call option,--degree,DEGREE) $(LS2SH_OPTIONS) $(threads)
 pack := $(bin)/pack-sample $(spec) --grains $(out)/grains.vdb $(call option,--seed,SEED) $(PACK_OPTIONS) $(threads)
-case := $(bin)/make-case $(out)/sample.h5 $(call option,--velocity,VELOCITY) $(call option,--angle,ANGLE) $(call option,--hole,HOLE) \
+case := $(bin)/make-case $(out)/sample.h5 $(call option,--velocity,VELOCITY) $(call option,--angle,ANGLE) $(call option,--hole,HOLE) $(call option,--pitch,PITCH) \
     $(call option,--cell,CELL) $(call option,--duration,DURATION) $(CASE_OPTIONS) $(threads)
 suffuse := $(bin)/suffuse $(out)/case $(threads)
 report := $(bin)/erosion-report $(out)/case
