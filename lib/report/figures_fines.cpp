@@ -195,7 +195,7 @@ Figure trapped_by_grain(const std::vector<CaseData>& cases)
 
 Figure trapped_by_throat(const std::vector<CaseData>& cases)
 {
-    constexpr std::array ends{0.5, 0.75, 0.9, 1.0, 1.1, 1.25, 1.5, 2.0};  // of the bins
+    constexpr std::array ends{0.5, 0.8, 1.0, 1.2, 1.5};  // of the bins
     Figure figure;
     figure.name = "trapped_by_throat";
     figure.title = "Trapped fines by throat";

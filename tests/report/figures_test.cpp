@@ -67,10 +67,10 @@ TEST(Figures, sort_trapped_fines_by_the_width_of_their_way_out)
         return std::get<double>(figure.table.rows.at(k).back());
     };
     EXPECT_EQ(count("< 0.5"), 1);
-    EXPECT_EQ(count("0.9-1"), 1);
-    EXPECT_EQ(count("1-1.1"), 2);
-    EXPECT_EQ(count("> 2"), 1);
-    EXPECT_EQ(count("0.5-0.75"), 0);
+    EXPECT_EQ(count("0.8-1"), 1);
+    EXPECT_EQ(count("1-1.2"), 2);
+    EXPECT_EQ(count("> 1.5"), 1);
+    EXPECT_EQ(count("0.5-0.8"), 0);
 }
 
 TEST(Figures, of_a_full_case_answer_those_of_the_paper)
