@@ -10,6 +10,8 @@ namespace coral::dem {
 
 namespace {
 
+constexpr double steepest_ball = 1.05;  ///< distances over a ball of nodes rise by this much of its radius at most
+
 struct Directed {
     Index slave, master;
     double share;
@@ -41,50 +43,74 @@ std::vector<Directed> direct(const World::Impl& world, const std::vector<BroadPa
     return directed;
 }
 
-/// Nodes of `slave` within reach of a partner, tested cluster by cluster.
+/// Nodes of `slave` within reach of a partner, tested cluster by cluster. `distance(limit, p)` of a place in the slave's shape frame may be
+/// any lower bound above the limit. \return lower bound of the distance of all others
 template <class Distance>
-void append_nodes(const World::Impl& world, Index slave, const Distance& distance, NodeList& l)
+double append_nodes(const World::Impl& world, Index slave, const Distance& distance, NodeList& l)
 {
     const double reach = l.skin + l.slack();
     const std::size_t a = std::size_t(slave);
     const Shape& shape = *world.shapes[std::size_t(world.shape[a])];
-    const double scale = world.scale[a];
-    const Eigen::Matrix3d rotation = scale * world.q[a].toRotationMatrix();
-    const auto near = [&](const Shape::Cluster& c) { return distance(rotation * c.centre) <= 1.05 * scale * c.radius + reach; };
+    double unlisted = std::numeric_limits<double>::infinity();
+    const auto near = [&](const Shape::Cluster& c) {
+        const double around = steepest_ball * world.scale[a] * c.radius, nearest = distance(around + reach, c.centre) - around;
+        if (nearest <= reach) return true;
+        unlisted = std::min(unlisted, nearest);
+        return false;
+    };
     for (const Shape::Cluster& group : shape.groups()) {
         if (!near(group)) continue;
         for (int c = group.begin; c < group.end; ++c) {
             const Shape::Cluster& cluster = shape.clusters()[std::size_t(c)];
             if (!near(cluster)) continue;
-            for (int n = cluster.begin; n < cluster.end; ++n)
-                if (const double d = distance(rotation * shape.nodes()[std::size_t(n)]); d < reach) {
+            for (int n = cluster.begin; n < cluster.end; ++n) {
+                const double d = distance(reach, shape.nodes()[std::size_t(n)]);
+                if (d < reach) {
                     l.node.push_back(n);
                     l.clearance.push_back(std::nextafter(float(d - l.slack()), -std::numeric_limits<float>::infinity()));
+                } else {
+                    unlisted = std::min(unlisted, d);
                 }
+            }
         }
     }
+    return unlisted;
 }
 
-void look_at(const World::Impl& world, const Directed& d, NodeList& l)
+/// Lists the near nodes of a pair. \return lower bound of the distance of all others
+double look_at(const World::Impl& world, const Directed& d, NodeList& l)
 {
     const std::size_t a = std::size_t(d.slave);
+    const Eigen::Matrix3d rotation = world.scale[a] * world.q[a].toRotationMatrix();
     if (d.master >= 0) {
         const std::size_t b = std::size_t(d.master);
-        const Vec3 to_b = world.periodic(world.x[a] - world.x[b]);
         const double scale = world.scale[b];
-        const Eigen::Matrix3d to_local = world.q[b].toRotationMatrix().transpose() / scale;
-        const detail::DistanceField field(*world.shapes[std::size_t(world.shape[b])]);
-        append_nodes(world, d.slave, [&](const Vec3& arm) { return scale * field.lower_bound(to_local * (to_b + arm)); }, l);
-        return;
+        const Eigen::Matrix3d world_to_b = world.q[b].toRotationMatrix().transpose() / scale, to_b = world_to_b * rotation;
+        const Vec3 shift = world_to_b * world.periodic(world.x[a] - world.x[b]);
+        const Shape& shape = *world.shapes[std::size_t(world.shape[b])];
+        if (shape.kind() == ShapeKind::grid)
+            return append_nodes(world, d.slave, [&](double, const Vec3& p) { return scale * shape.distance_grid().sample(to_b * p + shift); }, l);
+        const Polyhedron& polyhedron = shape.polyhedron();
+        // The plane that was highest last is asked first: of nodes near each other most are far from the same one.
+        Vec3 normal = Vec3::Zero();
+        double offset = std::numeric_limits<double>::infinity();
+        return append_nodes(world, d.slave, [&](double limit, const Vec3& p) {
+            const Vec3 local = to_b * p + shift;
+            double height = normal.dot(local) - offset;
+            if (scale * height > limit) return scale * height;
+            height = polyhedron.depth_and_normal(local, normal);
+            offset = normal.dot(local) - height;
+            return scale * height;
+        }, l);
     }
     const WallData& wall = world.walls[std::size_t(-1 - d.master)];
     if (wall.kind == WallData::Kind::plane) {
         const double height = wall.normal.dot(world.x[a] - wall.point);
-        append_nodes(world, d.slave, [&](const Vec3& arm) { return height + wall.normal.dot(arm); }, l);
-    } else {
-        Vec3 gradient;
-        append_nodes(world, d.slave, [&](const Vec3& arm) { return wall.distance_and_gradient(world.x[a] + arm, gradient); }, l);
+        const Vec3 up = rotation.transpose() * wall.normal;
+        return append_nodes(world, d.slave, [&](double, const Vec3& p) { return height + up.dot(p); }, l);
     }
+    Vec3 gradient;
+    return append_nodes(world, d.slave, [&](double, const Vec3& p) { return wall.distance_and_gradient(world.x[a] + rotation * p, gradient); }, l);
 }
 
 }  // namespace
@@ -144,15 +170,19 @@ void World::Impl::list_nodes(const std::vector<BroadPair>* pairs)
     l.wall_ways.resize(walls.size());
     // Whoever has used up half of the way is looked at anew, so that the lists last a while.
     const double keeps = l.skin == old.skin ? 0.5 * free_path * l.skin : -1.0;
+    constexpr std::uint8_t lost = 2;  // nobody knows how far it has come
     std::vector<std::uint8_t> moved(x.size(), 0), wall_moved(walls.size(), 0);
     for (std::size_t i = 0; i < x.size(); ++i) {
-        if (!in[i] || !has_nodes[i] || note_way(i) <= keeps) continue;
-        moved[i] = 1;
+        if (!in[i] || !has_nodes[i]) continue;
+        const double way = note_way(i);
+        if (way <= keeps) continue;
+        moved[i] = std::isfinite(way) ? 1 : lost;
         l.ways[i].listed = l.ways[i].length;
     }
     for (std::size_t k = 0; k < walls.size(); ++k) {
-        if (note_wall_way(k) <= keeps) continue;
-        wall_moved[k] = 1;
+        const double way = note_wall_way(k);
+        if (way <= keeps) continue;
+        wall_moved[k] = std::isfinite(way) ? 1 : lost;
         l.wall_ways[k].listed = l.wall_ways[k].length;
     }
 
@@ -165,14 +195,18 @@ void World::Impl::list_nodes(const std::vector<BroadPair>* pairs)
     for (const Directed& d : directed) {
         while (o < old.slave.size() && key_of(old.slave[o], old.master[o]) < key_of(d.slave, d.master)) ++o;
         const bool known = o < old.slave.size() && old.slave[o] == d.slave && old.master[o] == d.master;
-        const bool stays = known && !moved[std::size_t(d.slave)] && !(d.master < 0 ? wall_moved[std::size_t(-1 - d.master)] : moved[std::size_t(d.master)]);
+        const std::uint8_t of_pair = std::max(moved[std::size_t(d.slave)], d.master < 0 ? wall_moved[std::size_t(-1 - d.master)] : moved[std::size_t(d.master)]);
+        const double way = l.way_of(d.slave, d.master);
+        // Most pairs are so far apart that their bodies may move for long before any node comes near that is not listed.
+        const bool stays = known && (of_pair == 0 || (of_pair != lost && keeps >= 0.0 && old.unlisted[o] - steepest * (way - old.way_listed[o]) > l.skin + l.slack()));
         const std::size_t begin = l.node.size();
-        l.way_listed.push_back(stays ? old.way_listed[o] : l.way_of(d.slave, d.master));
+        l.way_listed.push_back(stays ? old.way_listed[o] : way);
         if (stays) {
+            l.unlisted.push_back(old.unlisted[o]);
             l.node.insert(l.node.end(), old.node.begin() + old.start[o], old.node.begin() + old.start[o + 1]);
             l.clearance.insert(l.clearance.end(), old.clearance.begin() + old.start[o], old.clearance.begin() + old.start[o + 1]);
         } else {
-            look_at(*this, d, l);
+            l.unlisted.push_back(std::nextafter(float(look_at(*this, d, l)), 0.0F));
         }
         float least = std::numeric_limits<float>::infinity();
         for (std::size_t k = begin; k < l.node.size(); ++k) least = std::min(least, l.clearance[k]);

@@ -122,6 +122,7 @@ void World::restore(std::span<const std::uint8_t> state)
     m.sphere_grids.pocket.assign(m.sphere_grids.within.size(), {});
     for (std::size_t k = 0; k < m.sphere_grids.within.size(); ++k)
         if (m.sphere_grids.within[k] > 0.0) m.make_pocket(k);
+    m.nodes.unlisted.assign(m.nodes.slave.size(), 0.0F);
     m.spheres.make_room();
     m.sphere_walls.make_room();
     m.sphere_grids.near.resize(m.sphere_grids.sphere.size());

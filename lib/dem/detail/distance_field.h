@@ -47,11 +47,6 @@ struct DistanceField {
     {
         return grid ? remembered(p, gradient, memory) : polyhedron->depth_and_normal(p, gradient);
     }
-    double lower_bound(const Eigen::Vector3d& p) const
-    {
-        Eigen::Vector3d ignored;
-        return grid ? grid->sample(p) : polyhedron->depth_and_normal(p, ignored);
-    }
 
 private:
     double remembered(const Eigen::Vector3d& p, Eigen::Vector3d& gradient, CellMemory& memory) const

@@ -198,7 +198,7 @@ constexpr double free_path = 0.4;
 /// Lattices may rise a little faster than the way: what was farther away than this times the way is not there yet.
 constexpr double steepest = 1.25;
 /// Skin of the lists of nodes / that of the spheres; shortest hop of a way / that skin.
-constexpr double node_skin = 0.4, hop_share = 0.005;
+constexpr double node_skin = 0.4, hop_share = 0.001;
 
 /// How far the points of a body (or wall) have come, counted in hops: a body hops when one of its points may be `hop` from where it was at
 /// the last hop. It grows only, and what a body that trembles in its place does is not counted. Between any two times
@@ -220,6 +220,7 @@ struct NodeList {
     std::vector<float> clearance;             ///< distance when it was last looked at + the way of the pair until then, rounded down [m]
     std::vector<float> least;                 ///< clearance of a pair; infinite without near nodes
     std::vector<double> way_listed;           ///< of the pair, from which its way counts [m]
+    std::vector<float> unlisted;              ///< no other node of a pair was nearer when it was looked at [m]; not saved, 0 after a restart
     std::vector<double> owed;                 ///< per pair: error of its work that waits for correction [J]
     std::vector<Index> first, count;          ///< contacts of a pair, within those of its block
     std::vector<std::vector<NodeContact>> contacts, fresh;  ///< per block; fresh is for the loop
@@ -244,7 +245,7 @@ constexpr std::size_t body_grain = 1024, row_grain = 1024, entry_grain = 2048, g
 /// Angle between two orientations, or a little less [rad]: |q - q'| is half of it for small ones, and either sign of q is the same.
 inline double turn_between(const Quat& a, const Quat& b)
 {
-    return 2.0 * std::min((a.coeffs() - b.coeffs()).norm(), (a.coeffs() + b.coeffs()).norm());
+    return 2.0 * std::sqrt(std::min((a.coeffs() - b.coeffs()).squaredNorm(), (a.coeffs() + b.coeffs()).squaredNorm()));
 }
 
 /// Pair of the broad phase.
