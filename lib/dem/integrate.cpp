@@ -22,19 +22,35 @@ void turn_sphere(Quat& q, const Vec3& turn)
     else q.normalize();
 }
 
-/// Rotates the body-frame angular momentum about axis k by the flow of b_k^2/(2 I_k) over time t; `turn` gathers the rotation of the body.
-void spin_about(int k, double t, const Vec3& inverse_moment, Vec3& b, Quat& turn)
+struct SineCosine {
+    double sine, cosine;
+};
+
+/// Series for the small angles of a step: what they leave out is below the last digit.
+SineCosine sine_and_cosine(double angle)
 {
-    const double angle = b[k] * inverse_moment[k] * t;
-    const double c = std::cos(angle), s = std::sin(angle);
-    const int m = (k + 1) % 3, n = (k + 2) % 3;
-    const double bm = b[m], bn = b[n];
-    b[m] = c * bm + s * bn;
-    b[n] = c * bn - s * bm;
-    Quat axis = Quat::Identity();
-    axis.w() = std::cos(0.5 * angle);
-    axis.vec()[k] = std::sin(0.5 * angle);
-    turn = turn * axis;
+    if (std::abs(angle) > 0.1) return {std::sin(angle), std::cos(angle)};
+    const double z = angle * angle;
+    return {angle * (1.0 - z / 6.0 * (1.0 - z / 20.0 * (1.0 - z / 42.0 * (1.0 - z / 72.0)))),
+            1.0 - z / 2.0 * (1.0 - z / 12.0 * (1.0 - z / 30.0 * (1.0 - z / 56.0 * (1.0 - z / 90.0))))};
+}
+
+/// Rotates the body-frame angular momentum about axis k by the flow of b_k^2/(2 I_k) over time t; `turn` gathers the rotation of the body.
+template <int k>
+void spin_about(double t, const Vec3& inverse_moment, Vec3& b, Quat& turn)
+{
+    constexpr int m = (k + 1) % 3, n = (k + 2) % 3;
+    const auto [s, c] = sine_and_cosine(0.5 * b[k] * inverse_moment[k] * t);
+    const double sine = 2.0 * s * c, cosine = 1.0 - 2.0 * s * s, bm = b[m], bn = b[n];
+    b[m] = cosine * bm + sine * bn;
+    b[n] = cosine * bn - sine * bm;
+    // turn * (c + s e_k)
+    const Vec3 v = turn.vec();
+    const double w = turn.w();
+    turn.w() = c * w - s * v[k];
+    turn.vec()[k] = c * v[k] + s * w;
+    turn.vec()[m] = c * v[m] + s * v[n];
+    turn.vec()[n] = c * v[n] - s * v[m];
 }
 
 /// Free rotation over dt with constant world angular momentum: five exact rotations, symmetric, symplectic.
@@ -43,11 +59,11 @@ Quat free_rotation(const Quat& principal_to_world, const Vec3& momentum, const V
     const Vec3 inverse = moments.cwiseInverse();
     Vec3 b = principal_to_world.conjugate() * momentum;
     Quat turn = Quat::Identity();
-    spin_about(0, 0.5 * dt, inverse, b, turn);
-    spin_about(1, 0.5 * dt, inverse, b, turn);
-    spin_about(2, dt, inverse, b, turn);
-    spin_about(1, 0.5 * dt, inverse, b, turn);
-    spin_about(0, 0.5 * dt, inverse, b, turn);
+    spin_about<0>(0.5 * dt, inverse, b, turn);
+    spin_about<1>(0.5 * dt, inverse, b, turn);
+    spin_about<2>(dt, inverse, b, turn);
+    spin_about<1>(0.5 * dt, inverse, b, turn);
+    spin_about<0>(0.5 * dt, inverse, b, turn);
     return (principal_to_world * turn).normalized();
 }
 
@@ -195,8 +211,9 @@ void World::Impl::turn_grid(std::size_t i, double dt)
 {
     if (motion[i] == Motion::free) {
         const Quat& frame = shapes[std::size_t(shape[i])]->principal_rotation();
-        q[i] = free_rotation(q[i] * frame, momentum[i], principal[i], dt) * frame.conjugate();
-        update_spin(i);
+        const Quat turned = free_rotation(q[i] * frame, momentum[i], principal[i], dt);
+        q[i] = turned * frame.conjugate();
+        w[i] = turned * (turned.conjugate() * momentum[i]).cwiseQuotient(principal[i]);
         return;
     }
     const double angle = w[i].norm() * dt;
