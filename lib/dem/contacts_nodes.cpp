@@ -17,6 +17,7 @@ struct Field {
     detail::DistanceField body;
     const WallData* wall = nullptr;
     Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  ///< body to world
+    Eigen::Matrix3d to_local = Eigen::Matrix3d::Identity();  ///< its inverse, over the scale
     Vec3 centre = Vec3::Zero();  ///< of the body, nearest image to the slave
     double scale = 1.0;
 
@@ -25,7 +26,7 @@ struct Field {
     {
         if (!wall) {
             Vec3 local;
-            const double d = scale * body.depth_and_gradient(rotation.transpose() * (p - centre) / scale, local, memory);
+            const double d = scale * body.depth_and_gradient(to_local * (p - centre), local, memory);
             gradient = rotation * local;
             return d;
         }
@@ -89,6 +90,7 @@ public:
             field_.rotation = world.q[b].toRotationMatrix();
             field_.centre = world.x[a] - to_b_;
             field_.scale = world.scale[b];
+            field_.to_local = field_.rotation.transpose() / field_.scale;
             master_inverse_mass = world.inverse_mass[b];
             inverse_radius += 1.0 / world.equivalent[b];
             velocity_b_ = world.v[b];
@@ -118,33 +120,30 @@ public:
         const Shape& surface = *world_.shapes[std::size_t(world_.shape[a_])];
         const Eigen::Matrix3d rotation = world_.scale[a_] * world_.q[a_].toRotationMatrix();
         auto past = old.begin();
-        float least = std::numeric_limits<float>::infinity();
-        for (Index k = list_.start[p_]; k < list_.start[p_ + 1]; ++k) {
+        float least = find_near(near, surface);
+        for (const Index k : near_) {
             const Index node = list_.node[std::size_t(k)];
             for (; past != old.end() && past->node < node; ++past) release(*past, 0.0, Vec3::Zero(), s);
             const bool held = past != old.end() && past->node == node;
-            float& clearance = list_.clearance[std::size_t(k)];
-            if (!held && double(clearance) > near) {
-                least = std::min(least, clearance);
-                continue;
-            }
             ++s.node_queries;
-            NodeContact c;
+            NodeContact& c = now.emplace_back();
             c.node = node;
             // Nodes are many and far apart in memory: what touches carries its own.
             const bool carried = held && past->stiffness > 0.0;
             c.place = carried ? past->place : surface.nodes()[std::size_t(node)];
             c.arm = rotation * c.place;
-            if (held) c.cell = past->cell;
+            if (held && field_.body.grid) c.cell = past->cell;
             c.depth = -field_(world_.x[a_] + c.arm, c.gradient, c.cell);
-            c.stiffness = carried ? past->stiffness : stiffness_ * surface.node_areas()[std::size_t(node)];
             constexpr float none = -std::numeric_limits<float>::infinity();
-            clearance = c.depth > 0.0 ? none : std::nextafter(float(near - c.depth - list_.slack()), none);
+            const float clearance = c.depth > 0.0 ? none : std::nextafter(float(near - c.depth - list_.slack()), none);
+            list_.clearance[std::size_t(k)] = clearance;
             least = std::min(least, clearance);
             if (c.depth <= 0.0) {
-                if (held) release(*past, 0.0, Vec3::Zero(), s), ++past;
+                now.pop_back();
+                if (held) release(*past++, 0.0, Vec3::Zero(), s);
                 continue;
             }
+            c.stiffness = carried ? past->stiffness : stiffness_ * surface.node_areas()[std::size_t(node)];
             const detail::NodePotential potential = detail::node_potential(c.depth, inverse_length_);
             c.force = c.stiffness * potential.force;
             const double stored = c.stiffness * potential.energy;
@@ -154,12 +153,11 @@ public:
             if (held) {
                 release(*past, stored, push, s, &c);
                 c.spring = past->spring;
-                old_.push_back(*past++);
+                old_.push_back(&*past++);
             } else {
                 if (dt_ > 0.0) error_.add(-stored - 0.5 * dt_ * push.dot(velocity_now(c.arm)), stored, push, c.arm);
-                old_.push_back({});
+                old_.push_back(nullptr);
             }
-            now.push_back(c);
         }
         for (; past != old.end(); ++past) release(*past, 0.0, Vec3::Zero(), s);
         list_.least[p_] = least;
@@ -170,7 +168,7 @@ public:
         const double inverse_total = total_ > 0.0 ? 1.0 / total_ : 0.0;
         for (NodeContact& c : contacts) {
             const double weight = c.force * inverse_total, slope = c.gradient.norm();
-            const Vec3 n = slope < 1e-9 ? Vec3::UnitZ() : Vec3(c.gradient / slope);
+            const Vec3& n = normal_.emplace_back(direction(c.gradient, slope));
             const double elastic = c.force * slope;
             c.force = elastic;
             c.touch = 1;
@@ -194,20 +192,17 @@ public:
         const double per_normal = normal_total_ > 0.0 ? 1.0 / normal_total_ : 0.0;
         for (std::size_t k = 0; k < contacts.size(); ++k) {
             NodeContact& c = contacts[k];
-            const NodeContact& past = old_[k];
-            const double slope = c.gradient.norm();
-            const Vec3 n = slope < 1e-9 ? Vec3::UnitZ() : Vec3(c.gradient / slope);
+            const NodeContact* const past = old_[k];
+            const Vec3& n = normal_[k];
             const Vec3 velocity = velocity_now(c.arm), slide = velocity - n.dot(velocity) * n;
             const double weight = share_ * c.force * per_normal;
             Vec3 old_slide = Vec3::Zero();
             double held = 0.0, taken = 0.0;
-            if (past.touch) {
-                const Vec3 old_velocity = velocity_before(past.arm);
-                const double old_slope = past.gradient.norm();
-                const Vec3 old_n = old_slope < 1e-9 ? Vec3::UnitZ() : Vec3(past.gradient / old_slope);
+            if (past && past->touch) {
+                const Vec3 old_velocity = velocity_before(past->arm), old_n = direction(past->gradient);
                 old_slide = old_velocity - old_n.dot(old_velocity) * old_n;
-                held = -0.5 * past.pull.dot(past.spring);
-                taken = -0.5 * dt_ * past.pull.dot(old_velocity);
+                held = -0.5 * past->pull.dot(past->spring);
+                taken = -0.5 * dt_ * past->pull.dot(old_velocity);
             }
             const detail::Friction friction = detail::rub({*law_, n, slide, old_slide, 0.5 * (world_.w[a_] + spin_b_).dot(n), root_mass_}, normal_total_ / share_,
                                                           dt_, c.spring);
@@ -239,6 +234,40 @@ public:
     }
 
 private:
+    static Vec3 direction(const Vec3& gradient, double slope) { return slope < 1e-9 ? Vec3::UnitZ() : Vec3(gradient / slope); }
+    static Vec3 direction(const Vec3& gradient) { return direction(gradient, gradient.norm()); }
+
+    /// Finds the nodes that may touch, and fetches their places. \return least clearance of the others
+    float find_near(double near, const Shape& surface)
+    {
+        const std::size_t first = std::size_t(list_.start[p_]), count = std::size_t(list_.start[p_ + 1]) - first;
+        const float* const clearance = list_.clearance.data() + first;
+        constexpr float infinite = std::numeric_limits<float>::infinity();
+        const float limit = std::nextafter(float(near), infinite);
+        near_.resize(count);
+        std::size_t found = 0;
+        for (std::size_t k = 0; k < count; ++k) {  // without branches, that nobody could foresee
+            near_[found] = Index(first + k);
+            found += clearance[k] <= limit;
+        }
+        near_.resize(found);
+        for (const Index k : near_)
+            if (list_.clearance[std::size_t(k)] > -infinite) __builtin_prefetch(&surface.nodes()[std::size_t(list_.node[std::size_t(k)])]);
+        // Lanes compare side by side, so that the loop vectorises.
+        constexpr std::size_t lanes = 8;
+        float least[lanes];
+        std::fill(least, least + lanes, infinite);
+        std::size_t k = 0;
+        for (; k + lanes <= count; k += lanes)
+            for (std::size_t l = 0; l < lanes; ++l) {
+                const float far = clearance[k + l] <= limit ? infinite : clearance[k + l];
+                least[l] = far < least[l] ? far : least[l];
+            }
+        for (; k < count; ++k)
+            if (clearance[k] > limit) least[0] = std::min(least[0], clearance[k]);
+        return *std::min_element(least, least + lanes);
+    }
+
     /// Of a point of the slave against the master, in the middle of the step, as the geometry is at its end ...
     Vec3 velocity_now(const Vec3& arm) const { return world_.v[a_] - velocity_b_ + world_.w[a_].cross(arm) - spin_b_.cross(to_b_ + arm); }
     /// ... and at its start.
@@ -274,17 +303,33 @@ private:
     Vec3 velocity_b_ = Vec3::Zero(), end_b_ = Vec3::Zero(), spin_b_ = Vec3::Zero(), old_spin_b_ = Vec3::Zero(), to_b_ = Vec3::Zero();
     double root_mass_, share_, stiffness_, inverse_length_, smaller_, total_ = 0.0, normal_total_ = 0.0;
     WorkError error_;
-    std::vector<NodeContact>& old_ = scratch();
-
-    static std::vector<NodeContact>& scratch()
+    // Of the pair at hand: room that is kept.
+    struct Scratch {
+        std::vector<Index> near;               ///< entries of the list that may touch
+        std::vector<const NodeContact*> old;   ///< of each contact, if it was there in the last step
+        std::vector<Vec3> normal;              ///< of each contact
+    };
+    static Scratch& scratch()
     {
-        static thread_local std::vector<NodeContact> contacts;
-        contacts.clear();
-        return contacts;
+        static thread_local Scratch room;
+        room.old.clear();
+        room.normal.clear();
+        return room;
     }
+    Scratch& scratch_ = scratch();
+    std::vector<Index>& near_ = scratch_.near;
+    std::vector<const NodeContact*>& old_ = scratch_.old;
+    std::vector<Vec3>& normal_ = scratch_.normal;
 };
 
 }  // namespace
+
+/// Fetches what the loop reads of a body. The partners of a body lie anywhere in memory.
+void World::Impl::fetch_body(std::size_t i) const
+{
+    for (const std::vector<Vec3>* of : {&x, &v, &v_end, &w, &w_before}) __builtin_prefetch(&(*of)[i]);
+    __builtin_prefetch(&q[i]);
+}
 
 void World::Impl::node_loop(double dt)
 {
@@ -295,28 +340,34 @@ void World::Impl::node_loop(double dt)
         LoopSums s;
         std::vector<Crossing>& crossing = crossings[base + block];
         std::vector<NodeContact>&contacts = l.contacts[block], &fresh = l.fresh[block];
+        // What was farther away when it was last looked at than both sides have come since is not looked at.
+        std::size_t due[node_grain], count = 0;
+        double near[node_grain];
+        for (std::size_t p = first; p < last; ++p) {
+            near[count] = steepest * (l.way_of(l.slave[p], l.master[p]) - l.way_listed[p]);
+            if (l.count[p] == 0 && double(l.least[p]) > near[count]) continue;
+            if (l.master[p] >= 0) fetch_body(std::size_t(l.master[p]));
+            due[count++] = p;
+        }
+        s.tests = l.start[last] - l.start[first];
         fresh.clear();
         GeneralForce* const begin = l.out.data() + first;
         GeneralForce* out = begin;
-        for (std::size_t p = first; p < last; ++p) {
-            s.tests += l.start[p + 1] - l.start[p];
-            // What was farther away when it was last looked at than both sides have come since is not looked at.
-            const double near = steepest * (l.way_of(l.slave[p], l.master[p]) - l.way_listed[p]);
+        for (std::size_t k = 0; k < count; ++k) {
+            const std::size_t p = due[k];
             const Index from = Index(fresh.size());
-            if (l.count[p] > 0 || double(l.least[p]) <= near) {
-                NodePair pair(*this, p, dt);
-                *out = {};
-                out->a = l.slave[p];
-                out->b = l.master[p];
-                pair.press({contacts.data() + l.first[p], std::size_t(l.count[p])}, near, fresh, s);
-                const std::span<NodeContact> now(fresh.data() + from, fresh.size() - std::size_t(from));
-                pair.damp(now, s);
-                pair.rub(now, *out, s);
-                pair.finish(*out, l.owed[p], crossing, s);
-                if (out->points > 0) ++out;
-            }
+            NodePair pair(*this, p, dt);
+            *out = {};
+            out->a = l.slave[p];
+            out->b = l.master[p];
+            pair.press({contacts.data() + l.first[p], std::size_t(l.count[p])}, near[k], fresh, s);
+            const std::span<NodeContact> now(fresh.data() + from, fresh.size() - std::size_t(from));
+            pair.damp(now, s);
+            pair.rub(now, *out, s);
+            pair.finish(*out, l.owed[p], crossing, s);
+            if (out->points > 0) ++out;
             l.first[p] = from;
-            l.count[p] = Index(fresh.size()) - from;
+            l.count[p] = Index(now.size());
         }
         contacts.swap(fresh);
         out_count[3][block] = std::int32_t(out - begin);
