@@ -322,6 +322,16 @@ private:
     std::vector<Vec3>& normal_ = scratch_.normal;
 };
 
+/// Fetches the lists of a pair and what its contacts keep.
+void fetch_pair(const NodeList& l, std::size_t p, std::span<const NodeContact> contacts)
+{
+    __builtin_prefetch(l.clearance.data() + l.start[p]);
+    __builtin_prefetch(l.node.data() + l.start[p]);
+    constexpr std::size_t cache_line = 64;
+    const std::span<const std::byte> kept = std::as_bytes(contacts);
+    for (std::size_t at = 0; at < kept.size(); at += cache_line) __builtin_prefetch(kept.data() + at);
+}
+
 }  // namespace
 
 /// Fetches what the loop reads of a body. The partners of a body lie anywhere in memory.
@@ -347,6 +357,7 @@ void World::Impl::node_loop(double dt)
             near[count] = steepest * (l.way_of(l.slave[p], l.master[p]) - l.way_listed[p]);
             if (l.count[p] == 0 && double(l.least[p]) > near[count]) continue;
             if (l.master[p] >= 0) fetch_body(std::size_t(l.master[p]));
+            fetch_pair(l, p, {contacts.data() + l.first[p], std::size_t(l.count[p])});
             due[count++] = p;
         }
         s.tests = l.start[last] - l.start[first];
