@@ -113,6 +113,28 @@ double look_at(const World::Impl& world, const Directed& d, NodeList& l)
     return append_nodes(world, d.slave, [&](double, const Vec3& p) { return wall.distance_and_gradient(world.x[a] + rotation * p, gradient); }, l);
 }
 
+/// How far bodies and walls have come since their pairs were last looked at.
+struct Moves {
+    enum Kind : std::uint8_t { little, far, unknown };
+    std::vector<Kind> bodies, walls;
+    Kind of(const Directed& d) const { return std::max(bodies[std::size_t(d.slave)], d.master < 0 ? walls[std::size_t(-1 - d.master)] : bodies[std::size_t(d.master)]); }
+};
+
+/// Those that have come farther than `keeps` start anew.
+Moves take_moves(World::Impl& world, double keeps)
+{
+    const auto take = [keeps](double way, Way& of) {
+        if (way <= keeps) return Moves::little;
+        of.listed = of.length;
+        return std::isfinite(way) ? Moves::far : Moves::unknown;
+    };
+    Moves moves{std::vector(world.x.size(), Moves::little), std::vector(world.walls.size(), Moves::little)};
+    for (std::size_t i = 0; i < world.x.size(); ++i)
+        if (world.in[i] && world.has_nodes[i]) moves.bodies[i] = take(world.note_way(i), world.nodes.ways[i]);
+    for (std::size_t k = 0; k < world.walls.size(); ++k) moves.walls[k] = take(world.note_wall_way(k), world.nodes.wall_ways[k]);
+    return moves;
+}
+
 }  // namespace
 
 std::span<const NodeContact> NodeList::contacts_of(std::size_t pair) const
@@ -170,21 +192,7 @@ void World::Impl::list_nodes(const std::vector<BroadPair>* pairs)
     l.wall_ways.resize(walls.size());
     // Whoever has used up half of the way is looked at anew, so that the lists last a while.
     const double keeps = l.skin == old.skin ? 0.5 * free_path * l.skin : -1.0;
-    constexpr std::uint8_t lost = 2;  // nobody knows how far it has come
-    std::vector<std::uint8_t> moved(x.size(), 0), wall_moved(walls.size(), 0);
-    for (std::size_t i = 0; i < x.size(); ++i) {
-        if (!in[i] || !has_nodes[i]) continue;
-        const double way = note_way(i);
-        if (way <= keeps) continue;
-        moved[i] = std::isfinite(way) ? 1 : lost;
-        l.ways[i].listed = l.ways[i].length;
-    }
-    for (std::size_t k = 0; k < walls.size(); ++k) {
-        const double way = note_wall_way(k);
-        if (way <= keeps) continue;
-        wall_moved[k] = std::isfinite(way) ? 1 : lost;
-        l.wall_ways[k].listed = l.wall_ways[k].length;
-    }
+    const Moves moves = take_moves(*this, keeps);
 
     l.start.push_back(0);
     l.node.reserve(old.node.size() + old.node.size() / 8);
@@ -195,10 +203,10 @@ void World::Impl::list_nodes(const std::vector<BroadPair>* pairs)
     for (const Directed& d : directed) {
         while (o < old.slave.size() && key_of(old.slave[o], old.master[o]) < key_of(d.slave, d.master)) ++o;
         const bool known = o < old.slave.size() && old.slave[o] == d.slave && old.master[o] == d.master;
-        const std::uint8_t of_pair = std::max(moved[std::size_t(d.slave)], d.master < 0 ? wall_moved[std::size_t(-1 - d.master)] : moved[std::size_t(d.master)]);
+        const Moves::Kind move = moves.of(d);
         const double way = l.way_of(d.slave, d.master);
         // Most pairs are so far apart that their bodies may move for long before any node comes near that is not listed.
-        const bool stays = known && (of_pair == 0 || (of_pair != lost && keeps >= 0.0 && old.unlisted[o] - steepest * (way - old.way_listed[o]) > l.skin + l.slack()));
+        const bool stays = known && (move == Moves::little || (move == Moves::far && keeps >= 0.0 && old.unlisted[o] - steepest * (way - old.way_listed[o]) > l.skin + l.slack()));
         const std::size_t begin = l.node.size();
         l.way_listed.push_back(stays ? old.way_listed[o] : way);
         if (stays) {
