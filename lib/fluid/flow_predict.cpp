@@ -291,24 +291,24 @@ void Flow::apply_fines(double dt)
             parallel_sum(range.planes(), planes_per_block, Pair(0.0, 0.0), [&](std::size_t begin, std::size_t end) {
                 Pair sum(0.0, 0.0);
                 const std::ptrdiff_t n = range.row_length();
-                std::vector<double> drag(static_cast<std::size_t>(n)), fines(drag);
+                std::vector<double> drag(static_cast<std::size_t>(n)), fines(drag), unheld(drag);
                 double *const drag_row = drag.data(), *const fines_row = fines.data();
                 const auto lanes = [](std::ptrdiff_t m, const auto& v) { return detail::lane_sum(m, v); };
                 for (int k = range.low.z() + int(begin); k < range.low.z() + int(end); ++k)
                     for (int j = range.low.y(); j < range.high.y(); ++j) {
                         const auto f0 = std::ptrdiff_t(layout_.index(range.low.x(), j, k));
+                        double* __restrict hold_row = hold ? hold + f0 : unheld.data();
 #pragma GCC ivdep
                         for (std::ptrdiff_t i = 0; i < n; ++i) {
                             const std::ptrdiff_t f = f0 + i;
                             const double face_eps = 0.5 * (eps[f] + eps[f - own]);
                             const double start = us[f] + repair;
-                            us[f] = (face_eps * start + dt * (A[f] * u[f] - B[f])) / (face_eps + dt * A[f]);
-                            drag_row[i] = face_eps * (us[f] - start);
+                            const double change = (A[f] * (u[f] - start) - B[f]) / (face_eps + dt * A[f]);
+                            us[f] = start + dt * change;
+                            hold_row[i] = change;
+                            drag_row[i] = face_eps * dt * change;
                             fines_row[i] = (face_eps - 1.0) * (p[f] - p[f - own]);
                         }
-                        if (hold)
-                            for (std::ptrdiff_t i = 0; i < n; ++i)
-                                hold[f0 + i] = 2.0 * drag_row[i] / (dt * (eps[f0 + i] + eps[f0 + i - own]));
                         sum[0] += detail::weighted_row(grid_, axis, range, j, k, lanes,
                                                        [&](std::ptrdiff_t i) { return drag_row[i]; });
                         sum[1] += detail::weighted_row(grid_, axis, range, j, k, lanes,
