@@ -1,5 +1,7 @@
 #include "fluid/grid.h"
 
+#include <atomic>
+#include <cstring>
 #include <string>
 
 #include "core/error.h"
@@ -54,6 +56,32 @@ void GridSpec::validate() const
         throw UsageError("boundary", "what flows in through the inlets cannot flow out",
                          "make one side an outlet with a pressure");
 }
+
+namespace detail {
+
+namespace {
+constexpr std::size_t line = 64, large = 65536;
+}
+
+void* allocate_staggered(std::size_t bytes)
+{
+    if (bytes < large) return ::operator new (bytes, std::align_val_t{line});
+    static std::atomic<std::size_t> count{0};
+    const std::size_t shift = line + 5 * line * (count++ % 16);
+    auto* const memory = static_cast<std::byte*>(::operator new (bytes + shift, std::align_val_t{line}));
+    std::byte* const array = memory + shift;
+    std::memcpy(array - sizeof memory, &memory, sizeof memory);  // for free_staggered
+    return array;
+}
+
+void free_staggered(void* array, std::size_t bytes)
+{
+    void* memory = array;
+    if (bytes >= large) std::memcpy(&memory, static_cast<std::byte*>(array) - sizeof memory, sizeof memory);
+    ::operator delete (memory, std::align_val_t{line});
+}
+
+}  // namespace detail
 
 Layout::Layout(const Eigen::Vector3i& n) : cells(n)
 {

@@ -48,6 +48,13 @@ struct GridSpec {
     int last_unknown(int axis) const { return cells[axis] + (outlet(axis, 1) ? 1 : 0); }
 };
 
+namespace detail {
+/// Memory for an array that begins on a cache line. Large ones begin at other places of a page one after the other: what a loop reads of ten
+/// fields at the same index would else fall into one set of a cache that holds eight.
+void* allocate_staggered(std::size_t bytes);
+void free_staggered(void* memory, std::size_t bytes);
+}  // namespace detail
+
 /// Plain allocator that starts arrays on cache lines (and SIMD registers).
 template <class T>
 struct CacheAligned {
@@ -57,8 +64,8 @@ struct CacheAligned {
     CacheAligned(const CacheAligned<U>&)
     {
     }
-    T* allocate(std::size_t n) { return static_cast<T*>(::operator new (n * sizeof(T), std::align_val_t{64})); }
-    void deallocate(T* p, std::size_t) { ::operator delete (p, std::align_val_t{64}); }
+    T* allocate(std::size_t n) { return static_cast<T*>(detail::allocate_staggered(n * sizeof(T))); }
+    void deallocate(T* p, std::size_t n) { detail::free_staggered(p, n * sizeof(T)); }
     template <class U>
     bool operator==(const CacheAligned<U>&) const
     {
