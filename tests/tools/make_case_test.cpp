@@ -7,6 +7,7 @@
 
 #include "core/hdf5.h"
 #include "core/output_file.h"
+#include "dem/polyhedron.h"
 #include "pack/sample.h"
 #include "suffusion/case_file.h"
 #include "suffusion/plan.h"
@@ -50,6 +51,42 @@ TEST(MakeCase, sets_the_holes_as_far_apart_as_asked)
     EXPECT_EQ(refused.exit_code, 2);
     EXPECT_NE(refused.err.find("--pitch"), std::string::npos) << refused.err;
     EXPECT_FALSE(std::filesystem::exists(folder.path() / "narrow"));
+}
+
+TEST(MakeCase, plans_the_contact_steps_that_the_run_takes_for_angular_fines_too)
+{
+    const ScratchFolder folder;
+    std::vector<Eigen::Vector3d> corners;
+    for (int n = 0; n < 8; ++n) corners.emplace_back(n & 1 ? 1e-3 : -1e-3, n & 2 ? 1e-3 : -1e-3, n & 4 ? 1e-3 : -1e-3);
+    const dem::Polyhedron cube(corners);
+    dem::SurfaceNodes nodes = dem::polyhedron_nodes(cube, 200);
+    pack::ShapeTemplate shape;
+    shape.kind = pack::ShapeKind::polyhedron;
+    shape.name = "cube";
+    shape.vertices = corners;
+    shape.volume = shape.apparent_volume = cube.volume();
+    shape.equivalent_diameter = std::cbrt(6 * cube.volume() / std::numbers::pi);
+    shape.inertia = cube.inertia();
+    shape.nodes = nodes.positions;
+    shape.node_areas = nodes.areas;
+    pack::Sample sample = small_sample(true);
+    sample.shapes.push_back(shape);
+    sample.materials[0].normal_stiffness = 4e5, sample.materials[0].tangential_stiffness = 2e5;  // many contact steps a flow step
+    for (pack::Particle& p : sample.particles)
+        if (p.role == pack::Role::fine) p.shape = 1, p.scale = 1;
+    pack::write_sample(sample, folder.path() / "sample.h5");
+    suffusion::PlanOptions options;
+    options.cell = 1e-3;
+    const double planned = suffusion::make_plan(sample, options).dem_step, duration = 4e-3;
+    ASSERT_EQ(run_program("make-case sample.h5 -o case --cell 1mm --duration 4ms --quiet", folder.path()).exit_code, 0);
+    const ProgramResult ran = run_program("suffuse case --quiet", folder.path());
+    ASSERT_EQ(ran.exit_code, 0) << ran.err;
+    const H5File results = H5File::open(folder.path() / "case/results.h5");
+    const double steps = results.read_doubles("/performance/dem_steps").at(0), flow_steps = results.read_doubles("/performance/flow_steps").at(0);
+    // Each flow step is cut into whole steps, none longer than planned.
+    EXPECT_LE(duration / planned, steps * (1 + 1e-9));
+    EXPECT_GE(duration / planned, steps - flow_steps);
+    EXPECT_LT(flow_steps, 0.2 * steps);
 }
 
 TEST(MakeCase, writes_a_case_that_reads_back_and_runs)
