@@ -37,11 +37,11 @@ ifneq ($(findstring =,$(out)),)
 endif
 
 # What the scales differ in.
+# PITCH: the paper does not say how far apart the holes of its filter are. With webs of a third of a hole, three fifths open, conductivity and gradient
+# take the paper's course; with a quarter open (what make-case takes by itself) fines bridge the webs and little leaves (docs/validation/suffusion.md).
 defaults_small := SPACING=400um CELL=0.75mm DURATION=1s HOLE=6mm PITCH=7.7mm SAMPLE_VOXEL=0.25mm
 defaults_paper := SPACING=200um CELL=0.5mm DURATION=2s HOLE=6mm PITCH=7.7mm SAMPLE_VOXEL=0.15mm
 $(foreach setting,$(defaults_$(SCALE)),$(eval $(firstword $(subst =, ,$(setting))) ?= $(lastword $(subst =, ,$(setting)))))
-# The paper does not say how far apart the holes of its filter are. With webs of a third of a hole, three fifths open, conductivity and gradient
-# take the paper's course; with a quarter open (what make-case takes by itself) fines bridge the webs and little leaves (docs/validation/suffusion.md).
 SCALE_TO ?= 15mm
 # Samples that differ by shape are compared at the same pressure: without it harmonics leave the small sample at four times what it had, and
 # fines that are held so much tighter do not erode. Harmonics of degree 10 miss a grain of 15 mm by more than a tenth of a fine: fines are moved

@@ -332,14 +332,14 @@ void fetch_pair(const NodeList& l, std::size_t p, std::span<const NodeContact> c
     for (std::size_t at = 0; at < kept.size(); at += cache_line) __builtin_prefetch(kept.data() + at);
 }
 
-}  // namespace
-
 /// Fetches what the loop reads of a body. The partners of a body lie anywhere in memory.
-void World::Impl::fetch_body(std::size_t i) const
+void fetch_body(const World::Impl& world, std::size_t i)
 {
-    for (const std::vector<Vec3>* of : {&x, &v, &v_end, &w, &w_before}) __builtin_prefetch(&(*of)[i]);
-    __builtin_prefetch(&q[i]);
+    for (const std::vector<Vec3>* of : {&world.x, &world.v, &world.v_end, &world.w, &world.w_before}) __builtin_prefetch(&(*of)[i]);
+    __builtin_prefetch(&world.q[i]);
 }
+
+}  // namespace
 
 void World::Impl::node_loop(double dt)
 {
@@ -356,7 +356,7 @@ void World::Impl::node_loop(double dt)
         for (std::size_t p = first; p < last; ++p) {
             near[count] = steepest * (l.way_of(l.slave[p], l.master[p]) - l.way_listed[p]);
             if (l.count[p] == 0 && double(l.least[p]) > near[count]) continue;
-            if (l.master[p] >= 0) fetch_body(std::size_t(l.master[p]));
+            if (l.master[p] >= 0) fetch_body(*this, std::size_t(l.master[p]));
             fetch_pair(l, p, {contacts.data() + l.first[p], std::size_t(l.count[p])});
             due[count++] = p;
         }

@@ -61,13 +61,15 @@ namespace detail {
 
 namespace {
 constexpr std::size_t line = 64, large = 65536;
+// A page has 64 lines: arrays begin on sixteen of them in turn, no two of which are alike.
+constexpr std::size_t places = 16, lines_apart = 5;
 }
 
 void* allocate_staggered(std::size_t bytes)
 {
     if (bytes < large) return ::operator new (bytes, std::align_val_t{line});
     static std::atomic<std::size_t> count{0};
-    const std::size_t shift = line + 5 * line * (count++ % 16);
+    const std::size_t shift = line + lines_apart * line * (count++ % places);
     auto* const memory = static_cast<std::byte*>(::operator new (bytes + shift, std::align_val_t{line}));
     std::byte* const array = memory + shift;
     std::memcpy(array - sizeof memory, &memory, sizeof memory);  // for free_staggered

@@ -358,7 +358,6 @@ struct World::Impl {
     bool press_on_nearest(std::size_t k, double dt, GeneralForce& out, LoopSums& s, std::vector<Crossing>& crossing);
     void close_books(std::size_t k, const PressMemory& now, bool clamped, double dt, GeneralForce& out, LoopSums& s, std::vector<Crossing>& crossing);
     void node_loop(double dt);
-    void fetch_body(std::size_t i) const;
     void sum_forces();
     void sum_forces(std::size_t first, std::size_t last);
     void refresh_forces();

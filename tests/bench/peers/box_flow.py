@@ -2,7 +2,7 @@
 """Our flow step against OpenFOAM's pimpleFoam: the same box with the same fixed bed of spheres, the same cells, one core each. Prints tables for docs/validation/flow-speed.md.
 
 OpenFOAM meshes the whole box and holds the velocity at zero in the cells whose centres lie in a sphere: what direct forcing does to a grid. Two scenes: at `--fine` cells
-a few steps for the time they take, at `--coarse` cells so long that the heads can be compared. Steps that count come after the first ones. Debian: apt-get install openfoam hdf5-tools
+a few steps for the time they take, at `--coarse` cells so long that the pressure drops can be compared. Steps that count come after the first ones. Debian: apt-get install openfoam hdf5-tools
 """
 import argparse
 import math
