@@ -45,6 +45,14 @@ bool changes_wall(const Slots& slots, const Vec3& normal)
     return false;
 }
 
+/// Overlap of a ball with the plane on which it would store as much (facet_quads.h), at most its radius. The energy is kn `stored` [m2].
+/// Unlike twice the energy over the force it stays finite between walls that push against each other.
+double overlap_with_plane(double stored, double radius)
+{
+    const double linear = std::sqrt(2.0 * stored);
+    return std::min(radius, 2.0 * linear / (1.0 + std::sqrt(std::max(0.0, 1.0 - 2.0 * linear / radius))));
+}
+
 /// What the walls of a grid press on a sphere, gathered by the place on the sphere: each has a dashpot and a friction spring.
 /// Only these are told apart by place; the elastic force is the plain sum over the surface.
 struct Places {
@@ -87,6 +95,18 @@ struct Places {
         energy[to] += energy[from];
         force[from].setZero();
         if (slot[to] < 0) std::swap(slot[to], slot[from]);
+    }
+    /// Energy of the hardest pressed wall: a flat one that is deep in the sphere presses on several places around it.
+    double energy_of_wall() const
+    {
+        double most = 0.0;
+        for (int p = 0; p < count; ++p) {
+            double sum = 0.0;
+            for (int o = 0; o < count; ++o)
+                if (force[o].dot(force[p]) > 0.0) sum += energy[o];
+            most = std::max(most, sum);
+        }
+        return most;
     }
 
 private:
@@ -181,6 +201,7 @@ bool World::Impl::press_on_walls(std::size_t k, double dt, GeneralForce& out, Lo
     const double spin_limit = 1e-12 * radius[i] * radius[i];
     Slots kept;
     kept.next = slots.next;
+    const double unit = stiffness * scale[j] / pair.kn;
     bool clamped = false;
     double total = 0.0;
     out = {};
@@ -188,7 +209,7 @@ bool World::Impl::press_on_walls(std::size_t k, double dt, GeneralForce& out, Lo
         const double size = places.force[p].norm();
         if (size * scale[j] * scale[j] <= spin_limit) continue;
         const Vec3 local_normal = places.force[p] / size, n = q[j] * local_normal;
-        const double overlap = 2.0 * scale[j] * places.energy[p] / size;  // of a plane
+        const double overlap = overlap_with_plane(unit * places.energy[p], radius[i]);
         const double approach = (v_end[j] + w[j].cross(offset) - v_end[i]).dot(n);
         const double fn = normal_force(stiffness * size, approach, pair, root_mass);
         clamped = clamped || fn == 0.0;
@@ -211,7 +232,6 @@ bool World::Impl::press_on_walls(std::size_t k, double dt, GeneralForce& out, Lo
         out.torque_b -= arm_j.cross(fn * n + ft);
         out.arm -= (fn * arm_i) * n;
         total += fn;
-        out.overlap = std::max(out.overlap, overlap);
         ++out.points;
     }
     slots = kept;
@@ -220,6 +240,7 @@ bool World::Impl::press_on_walls(std::size_t k, double dt, GeneralForce& out, Lo
     close_books(k, now, clamped, dt, out, s, crossing);
     if (out.points == 0) return false;
     if (total > 0.0) out.arm /= total;
+    out.overlap = overlap_with_plane(unit * places.energy_of_wall(), radius[i]);
     s.max_overlap = std::max(s.max_overlap, out.overlap / radius[i]);
     s.deep += out.overlap > options.overlap_cap * radius[i];
     return true;
