@@ -18,8 +18,9 @@ stack_options = $(call option,--voxel-size,VOXEL) $(call option,--solid,SOLID) $
     $(call option,--labels,LABELS) $(call option,--scale-to,SCALE_TO) $(call option,--spacing,SPACING) $(CSCT2LS_OPTIONS)
 say = @echo "== $(1)"
 
-# $(call remember,COMMAND): recipe of a file that holds a command and changes only when that does.
-remember = @mkdir -p $(@D); cmp -s - $@ <<<"$(1)" || echo "$(1)" >$@
+# $(call remember,COMMAND): recipe of a file that holds a command and changes only when that does. Threads do not change what a tool makes.
+threadless = $(strip $(subst $(threads),,$(1)))
+remember = @mkdir -p $(@D); cmp -s - $@ <<<"$(threadless)" || echo "$(threadless)" >$@
 
 # $(call resumable,CHECKPOINT,FILES): sets $$resume when the checkpoint is newer than all files that the step depends on.
 resumable = resume=; if [ -f $(1) ]; then resume=--resume; for newer in $(2); do [ $(1) -nt $$newer ] || resume=; done; fi
