@@ -274,6 +274,7 @@ void Simulation::restore(std::span<const std::uint8_t> state)
 {
     ByteReader in(state);
     time_ = in.number(), dem_step_ = in.number(), last_step_ = in.number();
+    if (const double given = scene_->description.time.dem_step; given > 0) dem_step_ = given;  // by itself it stays what it was, though grains leave
     steps_ = in.integer();
     balance_.mass = in.number(), balance_.momentum = in.number();
     eroded_ = in.array<std::uint8_t>();

@@ -18,7 +18,7 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Two layers of coarse grains over a plate, fines between, water from above: resolved, semi-resolved, eroding.
-std::string erosion_scene(const std::string& duration)
+std::string erosion_scene(const std::string& duration, const std::string& time_keys = "")
 {
     std::string text = R"(
 [domain]
@@ -43,7 +43,7 @@ thickness = "1.5mm"
 [output]
 interval = "2ms"
 [time]
-duration = ")" + duration + "\"\n";
+duration = ")" + duration + "\"\n" + time_keys;
     const auto body = [&](double d, double x, double y, double z, const char* role) {
         text += "[[body]]\nshape = { type = \"sphere\", diameter = " + std::to_string(d) + " }\nposition = [" + std::to_string(x) + ", " + std::to_string(y) + ", " + std::to_string(z) +
                 "]\nrole = \"" + role + "\"\n";
@@ -177,6 +177,21 @@ TEST(Suffuse, stopped_and_resumed_run_ends_as_one_never_stopped)
         const std::string path = std::string("/performance/") + name;
         EXPECT_EQ(whole.read_doubles(path), parts.read_doubles(path)) << name;
     }
+}
+
+TEST(Suffuse, resumed_run_goes_on_with_the_contact_step_of_the_changed_case)
+{
+    const ScratchFolder folder;
+    const auto dem_steps = [&] { return H5File::open(folder.path() / "results.h5").read_doubles("/performance/dem_steps")[0]; };
+    write_text(folder.path() / "case.toml", erosion_scene("4ms", "dem_step = \"2us\"\n"));
+    ASSERT_EQ(run_program("suffuse . --quiet --until 2ms", folder.path()).exit_code, 0);
+    const double first = dem_steps();
+    EXPECT_NEAR(first, 1000, 60) << "each flow step holds a whole number of them";
+    write_text(folder.path() / "case.toml", erosion_scene("4ms", "dem_step = \"1us\"\n"));
+    const ProgramResult rest = run_program("suffuse . --resume", folder.path());
+    ASSERT_EQ(rest.exit_code, 0) << rest.err;
+    EXPECT_NE(rest.err.find("case.toml has changed"), std::string::npos) << rest.err;
+    EXPECT_NEAR(dem_steps() - first, 2000, 60);
 }
 
 TEST(Suffuse, killed_run_goes_on_from_its_checkpoint_to_the_same_series)
