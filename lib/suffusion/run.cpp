@@ -186,7 +186,7 @@ void Run::loop(RunSummary& summary)
     const double duration = simulation_.scene().description.time.duration;
     const double end = std::min(duration, options_.until);
     const double checkpoint_seconds = simulation_.scene().description.output.checkpoint;
-    Progress progress("suffuse", end);
+    Progress progress("suffuse", end, simulation_.time());
     while (simulation_.time() < end * (1 - 1e-12)) {
         const double event = std::min(output_.next(simulation_.time()), frame_.next(simulation_.time()));
         simulation_.step(event);
