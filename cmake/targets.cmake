@@ -9,8 +9,8 @@ target_compile_options(coral_warnings INTERFACE -Wall -Wextra -Wshadow -Wnon-vir
 add_compile_options(-fno-math-errno -fno-trapping-math)
 if(CORAL_NATIVE)
     add_compile_options(-march=native)
-    # Never wider than AVX2: results are then the same on processors with and without AVX-512 (Eigen sums in another order there), and
-    # GCC 12's AVX-512 header warns of its own variables (GCC bug 105593).
+    # Never wider than AVX2: with AVX-512 Eigen would sum in another order than on other processors, and GCC 12's header warns of its own
+    # variables (GCC bug 105593).
     include(CheckCXXCompilerFlag)
     check_cxx_compiler_flag(-mno-avx512f CORAL_COMPILER_KNOWS_AVX512)
     if(CORAL_COMPILER_KNOWS_AVX512)
