@@ -33,7 +33,7 @@ struct Tracks {
 /// `/migration`: how far each fine came.
 struct Migration {
     std::vector<std::int64_t> id;
-    std::vector<double> path_length;       ///< summed moves between outputs [m]
+    std::vector<double> path_length;       ///< [m]
     std::vector<double> net_displacement;  ///< between the first and the last output [m]
     std::vector<std::int64_t> layer;       ///< layer at the start, 0 at the bottom
     std::vector<std::int64_t> eroded;      ///< 1 once below the filter plate

@@ -23,6 +23,7 @@ struct TrajectoryPart {
 constexpr std::array<TrajectoryPart, 9> trajectory_parts{{{"position", "m", 3}, {"speed", "m s-1", 1}, {"velocity", "m s-1", 3}, {"orientation", "1", 4},
                                                           {"angular_velocity", "rad s-1", 3}, {"fluid_force", "N", 3}, {"fluid_torque", "N m", 3}, {"contact_force", "N", 3}, {"state", "1", 1}}};
 
+constexpr double least_piece = 0.02;       ///< of a path, over the diameter
 constexpr double standard_gravity = 9.81;  ///< [m/s2], for the hydraulic gradient where the case has no gravity
 
 double gravity_of(const Case& c) { return c.gravity.norm() > 0 ? c.gravity.norm() : standard_gravity; }
@@ -65,7 +66,8 @@ Observer::Observer(const Simulation& simulation)
         results_.layer.push_back(static_cast<std::int64_t>(layer_of(x.z())));
         start_.push_back(x);
     }
-    last_ = start_;
+    last_ = mark_ = start_;
+    walked_.assign(start_.size(), 0);
     results_.path_length.assign(start_.size(), 0);
     results_.net_displacement.assign(start_.size(), 0);
     results_.eroded.assign(start_.size(), 0);
@@ -103,8 +105,22 @@ void Observer::put(const char* name, const char* unit, std::span<const double> v
     column.values.insert(column.values.end(), values.begin(), values.end());
 }
 
+void Observer::follow(const Simulation& simulation)
+{
+    const Scene& scene = simulation.scene();
+    for (std::size_t n = 0; n < mark_.size(); ++n) {
+        const auto body = static_cast<std::size_t>(results_.fines[n]);
+        const Vector3d& x = scene.world.position(static_cast<int>(body));
+        const double piece = (x - mark_[n]).norm();
+        if (piece < least_piece * scene.bodies[body].diameter) continue;
+        walked_[n] += piece;
+        mark_[n] = x;
+    }
+}
+
 void Observer::record(Simulation& simulation)
 {
+    follow(simulation);
     put("time", "s", simulation.time());
     record_erosion(simulation);
     record_trapping(simulation);
@@ -292,7 +308,7 @@ void Observer::record_migration(const Simulation& simulation)
         const Vector3d& x = simulation.scene().world.position(static_cast<int>(body));
         const double moved = (x - last_[n]).norm();
         motion_[n].update(elapsed > 0 ? moved / elapsed : 0, simulation.scene().bodies[body].diameter, simulation.eroded(body));
-        results_.path_length[n] += moved;
+        results_.path_length[n] = walked_[n] + (x - mark_[n]).norm();
         results_.net_displacement[n] = (x - start_[n]).norm();
         results_.eroded[n] = simulation.eroded(body);
         results_.state[n] = static_cast<std::int64_t>(motion_[n].state());
@@ -311,8 +327,8 @@ void Observer::record_migration(const Simulation& simulation)
 std::vector<std::uint8_t> Observer::save() const
 {
     ByteWriter out;
-    out.vectors(last_);
-    out.array<double>(results_.path_length);
+    for (const std::vector<Vector3d>* of : {&last_, &mark_}) out.vectors(*of);
+    for (const std::vector<double>* of : {&walked_, &results_.path_length}) out.array<double>(*of);
     out.number(last_time_);
     for (const MotionState& m : motion_) out.integer(static_cast<std::int64_t>(m.state())), out.integer(m.cloggings()), out.integer(m.uncloggings());
     out.integer(static_cast<std::int64_t>(trapped_.size()));
@@ -323,11 +339,11 @@ std::vector<std::uint8_t> Observer::save() const
 void Observer::resume(Results stored, std::size_t rows, std::span<const std::uint8_t> state)
 {
     ByteReader in(state);
-    std::vector<Vector3d> last = in.vectors();
-    std::vector<double> paths = in.array<double>();
+    std::vector<Vector3d> last = in.vectors(), mark = in.vectors();
+    std::vector<double> walked = in.array<double>(), paths = in.array<double>();
     const std::size_t parts = stored.trajectories.size();
     if (stored.tracked != results_.tracked || stored.fines != results_.fines || stored.rows() < rows || last.size() != last_.size() ||
-        paths.size() != last.size() || parts != trajectory_parts.size() || stored.column("fines_count").width != layers_)
+        mark.size() != last.size() || walked.size() != last.size() || paths.size() != last.size() || parts != trajectory_parts.size() || stored.column("fines_count").width != layers_)
         throw Error("results.h5", "is of another case or of an older version, or damaged", "run without --resume to start anew");
     last_time_ = in.number();
     for (MotionState& m : motion_) {
@@ -344,6 +360,8 @@ void Observer::resume(Results stored, std::size_t rows, std::span<const std::uin
         for (Column& column : stored.trajectories)
             if (column.name == part.name) results_.trajectories.push_back(std::move(column));
     results_.path_length = std::move(paths);
+    mark_ = std::move(mark);
+    walked_ = std::move(walked);
     last_ = std::move(last);
     for (std::size_t n = 0; n < last_.size(); ++n) {
         results_.net_displacement[n] = (last_[n] - start_[n]).norm();

@@ -18,12 +18,15 @@ class Observer {
 public:
     explicit Observer(const Simulation& simulation);
 
+    /// Adds to the paths of the fines; to be called after every step. A path is made of straight pieces of at least a fiftieth of the diameter, so
+    /// that it depends neither on outputs nor on steps, and grains that tremble at their place walk nowhere.
+    void follow(const Simulation& simulation);
     /// Appends one row for the state now.
     void record(Simulation& simulation);
     const Results& results() const { return results_; }
     Results& results() { return results_; }
 
-    /// For a checkpoint: path lengths, positions and states at the last output, trapped fines, as bytes. The rows themselves are in results.h5.
+    /// For a checkpoint: paths, positions and states at the last output, trapped fines, as bytes. The rows themselves are in results.h5.
     std::vector<std::uint8_t> save() const;
     /// Goes on from stored results cut to `rows`.
     /// \throws Error when they are of another case
@@ -51,6 +54,8 @@ private:
     int axis_ = 2, lower_plane_ = 0, upper_plane_ = 0;  ///< cells of the two pressure planes
     double direction_ = -1;                             ///< of the mean flow along the axis
     std::vector<Eigen::Vector3d> start_, last_;         ///< positions of fines, in the order of results_.fines
+    std::vector<Eigen::Vector3d> mark_;                 ///< where the last piece of the path ended, in the same order
+    std::vector<double> walked_;                        ///< path to there [m]
     std::vector<MotionState> motion_;                   ///< in the same order
     std::optional<RegionFinder> regions_;               ///< with flow
     std::vector<Trapped> trapped_;                      ///< at the last output

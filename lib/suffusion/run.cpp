@@ -190,6 +190,7 @@ void Run::loop(RunSummary& summary)
     while (simulation_.time() < end * (1 - 1e-12)) {
         const double event = std::min(output_.next(simulation_.time()), frame_.next(simulation_.time()));
         simulation_.step(event);
+        observer_.follow(simulation_);
         if (simulation_.time() == event) at_event();
         progress.update(simulation_.time(), fmt::format("step {} of {:.2e} s", simulation_.steps(), simulation_.last_flow_step()));
         if (options_.interrupted()) {

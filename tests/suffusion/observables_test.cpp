@@ -133,7 +133,10 @@ Results run(const Scratch& scratch, const std::string& text)
     observer.record(simulation);
     const double step = simulation.scene().description.output.interval, end = simulation.scene().description.time.duration;
     for (int k = 1; k * step <= end * (1 + 1e-9); ++k) {
-        while (simulation.time() < k * step * (1 - 1e-12)) simulation.step(k * step);
+        while (simulation.time() < k * step * (1 - 1e-12)) {
+            simulation.step(k * step);
+            observer.follow(simulation);
+        }
         observer.record(simulation);
     }
     return observer.results();
@@ -157,6 +160,34 @@ TEST(Migration, path_and_states_of_prescribed_fines_are_those_of_their_motion)
     ASSERT_EQ(r.trajectories.back().name, "state");
     EXPECT_EQ(r.trajectories.back().values.front(), 0);  // before the first move
     EXPECT_EQ(r.trajectories.back().values.back(), 0);   // the second fine, at the end
+}
+
+TEST(Migration, path_of_a_fine_that_comes_back_does_not_depend_on_the_outputs)
+{
+    // Thrown upwards at 0.1 m/s it is back after 2 v/g and has walked v^2/g.
+    const double g = 10, v = 0.1, length = v * v / g, diameter = 0.5e-3;
+    std::vector<double> found;
+    for (const char* interval : {"0.02", "0.002", "0.0001"}) {
+        const Scratch scratch;
+        const Results r = run(scratch, "[gravity]\nvector = [0, 0, -10]\n" + ball(diameter, {0, 0, 5e-3}, "role = \"fine\"\nvelocity = [0, 0, 0.1]") +
+                                           "[time]\nduration = 0.02\n[output]\ninterval = " + interval + "\n");
+        EXPECT_NEAR(r.net_displacement[0], 0, 1e-3 * length);
+        found.push_back(r.path_length[0]);
+        EXPECT_NEAR(found.back(), length, 2 * 0.02 * diameter) << "a piece at the turning point, there and back";
+    }
+    EXPECT_NEAR(found[1], found[0], 2 * 0.02 * diameter) << "steps end at outputs, and pieces with them";
+    EXPECT_NEAR(found[2], found[0], 2 * 0.02 * diameter);
+}
+
+TEST(Migration, trembling_fine_walks_nowhere)
+{
+    const Scratch scratch;
+    // 5 um to and fro on a frictionless floor, a hundredth of the diameter, a hundred times.
+    const Results r = run(scratch, "[gravity]\nvector = [0, 0, 0]\n" + ball(0.5e-3, {2.5e-6, 0, 1e-3}, "role = \"fine\"\nvelocity = [0.01, 0, 0]") +
+                                       "[[wall]]\ntype = \"plane\"\npoint = [-252.5e-6, 0, 0]\nnormal = [1, 0, 0]\n[[wall]]\ntype = \"plane\"\npoint = [257.5e-6, 0, 0]\nnormal = [-1, 0, 0]\n"
+                                       "[material.default]\ndensity = 2780\nnormal_stiffness = 2e5\ntangential_stiffness = 1e5\nfriction = 0\ndamping = 0\n" +
+                                       "[time]\nduration = 0.1\n[output]\ninterval = 0.05\n");
+    EXPECT_LT(r.path_length[0], 1e-5);
 }
 
 TEST(Layers, are_as_many_as_asked_for_and_hold_every_fine_once)
