@@ -4,8 +4,10 @@
 #include <cmath>
 #include <map>
 #include <memory>
+#include <numeric>
 #include <type_traits>
 
+#include "core/error.h"
 #include "core/stopwatch.h"
 #include "pack/detail/swap.h"
 #include "pack/sample_world.h"
@@ -40,9 +42,9 @@ std::vector<int> remove(Sample& sample, const std::vector<char>& out)
 }
 
 /// Fines whose centre a coarse grain with a new shape covers; where they find a place, they are moved to its surface.
-std::vector<char> trapped_fines(Sample& sample, const Sample& before, bool move)
+std::vector<char> covered_fines(Sample& sample, const Sample& before, bool move)
 {
-    std::vector<char> trapped(sample.particles.size(), 0);
+    std::vector<char> covered(sample.particles.size(), 0);
     std::vector<std::size_t> hosts;
     std::map<std::pair<int, int>, bool> same;  // of templates, new and old: lattices are large, grains many
     std::map<int, std::shared_ptr<const dem::Shape>> shapes;
@@ -64,7 +66,7 @@ std::vector<char> trapped_fines(Sample& sample, const Sample& before, bool move)
             const dem::Shape& shape = *shapes[host.shape];
             Vec3 local = host.orientation.conjugate() * nearest_image(sample, fine.position - host.position) / host.scale;
             if (local.norm() > shape.bounding_radius() || shape.distance(local) >= 0) continue;
-            trapped[i] = 1;
+            covered[i] = 1;
             for (int k = 0; move && k < 50; ++k) {
                 Vec3 gradient;
                 const double missing = radius / host.scale - shape.distance_and_gradient(local, gradient);
@@ -74,7 +76,20 @@ std::vector<char> trapped_fines(Sample& sample, const Sample& before, bool move)
             if (move) fine.position = host.position + host.orientation * (host.scale * local);
         }
     }
-    return trapped;
+    return covered;
+}
+
+/// Takes fines out of the new sample, of the old one and of the list of their numbers.
+void take_out(const std::vector<char>& out, detail::Replaced& swapped, Sample& rest, std::vector<int>& number)
+{
+    remove(rest, out);
+    const std::vector<int> index = remove(swapped.sample, out);
+    std::erase_if(swapped.drawn, [&](std::size_t i) { return index[i] < 0; });
+    for (std::size_t& i : swapped.drawn) i = std::size_t(index[i]);
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < index.size(); ++i)
+        if (index[i] >= 0) number[kept++] = number[i];
+    number.resize(kept);
 }
 
 double total_mass(const Sample& sample)
@@ -82,6 +97,13 @@ double total_mass(const Sample& sample)
     double sum = 0;
     for (const Particle& p : sample.particles) sum += mass(sample, p);
     return sum;
+}
+
+void relax(detail::Replaced& swapped, const Sample& rest, const std::vector<char>& moved_out, const SwapOptions& options, SwapReport& report)
+{
+    report.mass_before = total_mass(rest);
+    report.mass_after = total_mass(swapped.sample);
+    detail::relax_swapped(swapped, rest, moved_out, options, report);
 }
 
 }  // namespace
@@ -99,23 +121,33 @@ Sample swap_shapes(const Sample& sample, const SwapOptions& options, std::uint64
         return detail::replace(sample, options, seed, report);
     }();
     const Stopwatch clock(report.relaxation_seconds);
-    std::vector<char> trapped = trapped_fines(swapped.sample, sample, !options.drop_trapped);
-    for (std::size_t i = 0; i < trapped.size(); ++i)
-        if (trapped[i]) report.trapped.push_back(int(i));
-    Sample rest = sample;
-    if (options.drop_trapped && !report.trapped.empty()) {
-        remove(rest, trapped);
-        const std::vector<int> index = remove(swapped.sample, trapped);
-        std::vector<std::size_t> drawn;
-        for (const std::size_t i : swapped.drawn)
-            if (index[i] >= 0) drawn.push_back(std::size_t(index[i]));
-        swapped.drawn = std::move(drawn);
-        trapped.assign(swapped.sample.particles.size(), 0);
+    std::vector<char> out = covered_fines(swapped.sample, sample, !options.drop_trapped);
+    for (std::size_t i = 0; i < out.size(); ++i)
+        if (out[i]) report.trapped.push_back(int(i));
+    if (!options.drop_trapped) {
+        relax(swapped, sample, out, options, report);
+        const std::vector<char> covered = covered_fines(swapped.sample, sample, false);
+        if (const auto at = std::find(covered.begin(), covered.end(), 1); at != covered.end())
+            throw Error("swap", "grain " + std::to_string(at - covered.begin()) + " was pushed into a coarse grain by the relaxation", "add --drop-trapped, or take shapes nearer to the old ones");
+        return std::move(swapped.sample);
     }
-    report.mass_before = total_mass(rest);
-    report.mass_after = total_mass(swapped.sample);
-    detail::relax_swapped(swapped, rest, trapped, options, report);
-    return std::move(swapped.sample);
+    // Fines at the mouth of a void may be pushed into the new shape while the sample relaxes: they go too, and it relaxes again without them.
+    Sample rest = sample;
+    std::vector<int> number(sample.particles.size());  // in the sample, of the grains that stay
+    std::iota(number.begin(), number.end(), 0);
+    for (;;) {
+        take_out(out, swapped, rest, number);
+        detail::Replaced relaxed = swapped;
+        SwapReport of_this = report;
+        relax(relaxed, rest, std::vector<char>(rest.particles.size(), 0), options, of_this);
+        out = covered_fines(relaxed.sample, rest, false);
+        for (std::size_t i = 0; i < out.size(); ++i)
+            if (out[i]) report.trapped.push_back(number[i]);
+        if (report.trapped.size() > of_this.trapped.size()) continue;
+        report = std::move(of_this);
+        std::sort(report.trapped.begin(), report.trapped.end());
+        return std::move(relaxed.sample);
+    }
 }
 
 }  // namespace coral::pack

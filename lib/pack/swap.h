@@ -19,7 +19,7 @@ struct SwapOptions {
     int degree = 10;                ///< of harmonics that are fitted here
     int faces = 26;                 ///< of polyhedra, at most
     int fine_nodes = 500;           ///< surface nodes of new fine shapes
-    bool drop_trapped = false;      ///< fines whose centre a new coarse shape covers are taken out; else they are moved to its surface
+    bool drop_trapped = false;      ///< fines whose centre a new coarse shape covers, now or while the sample relaxes, are taken out; else they are moved to its surface
     double limit = 0.15;            ///< refused: a coarse grain, or the mean of the fines, displaced by more of its diameter [-]
     double overlap_limit = 0;       ///< refused: an overlap that stays above this share of the smaller diameter [-]; 0: twice the sample's deepest, at least 5 %
     bool restore_pressure = false;  ///< walls move until each pair has the pressure it had

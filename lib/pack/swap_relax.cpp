@@ -39,6 +39,22 @@ Overlaps overlaps(const dem::World& world)
     return result;
 }
 
+/// Overlap over the smaller radius at which fines are free enough: what one contact in a hundred of the old sample had. Its deepest is no measure, a
+/// single fine that is wedged in.
+double usual_overlap(const dem::World& old)
+{
+    std::vector<double> depths;
+    for (const dem::Contact& c : old.contacts()) {
+        double r = old.equivalent_radius(c.first);
+        if (c.second >= 0) r = std::min(r, old.equivalent_radius(c.second));
+        depths.push_back(c.overlap / r);
+    }
+    if (depths.empty()) return harmless_overlap;
+    const auto at = depths.begin() + std::ptrdiff_t(depths.size() - 1 - depths.size() / 100);
+    std::nth_element(depths.begin(), at, depths.end());
+    return std::max(*at, harmless_overlap);
+}
+
 struct Balance {
     double unbalanced_ratio = 0, kinetic_ratio = 0;
 };
@@ -260,7 +276,6 @@ void relax_swapped(Replaced& swapped, const Sample& before, const std::vector<ch
     evaluate(old);
     evaluate(world);
     const Box box(sample, ids.walls);
-    const double allowed = std::max(2 * old.statistics().max_overlap, harmless_overlap);
     report.before = overlaps(old);
     report.swapped = overlaps(world);
     const bool moved = std::find(moved_out.begin(), moved_out.end(), 1) != moved_out.end();
@@ -274,9 +289,10 @@ void relax_swapped(Replaced& swapped, const Sample& before, const std::vector<ch
     }
     const std::vector<char> loaded = loaded_grains(before);
     set_coarse(world, sample, dem::Motion::fixed);
-    free_fines(world, swapped, allowed, report);
+    free_fines(world, swapped, usual_overlap(old), report);
     set_coarse(world, sample, dem::Motion::free);
-    report.iterations += world.relax(allowed, iterations_of_all);
+    // the skeleton moves only where it is deeper in itself than before; what is left is for the damped run
+    report.iterations += world.relax(std::max(2 * old.statistics().max_overlap, harmless_overlap), iterations_of_all);
     settle(world, sample, before, box, loaded, options, report);
 
     const Balance b = balance(world);

@@ -244,6 +244,47 @@ TEST(SwapShapes, a_fine_in_a_filled_void_is_listed_and_moved_out_or_taken_out)
     EXPECT_GT((moved.particles.back().position - inside.position).norm(), 3e-4);
 }
 
+TEST(SwapShapes, a_fine_pushed_against_a_new_shape_does_not_end_inside_it)
+{
+    // A fine whose centre is just outside the new surface, and a larger one that overlaps it from outside.
+    Sample sample = packed();
+    const std::size_t host = std::size_t(std::ranges::find(sample.particles, Role::coarse, &Particle::role) - sample.particles.begin());
+    SwapOptions options = coarse_to(ShapeKind::sh);
+    options.limit = options.overlap_limit = 10;
+    SwapReport report;
+    const Sample replaced = replace_shapes(sample, options, 1, report);
+    const Particle& grain = replaced.particles[host];
+    const auto shape = make_shape(replaced.shapes[std::size_t(grain.shape)]);
+    double out = 1e-3;
+    while (grain.scale * shape->distance(Vec3(out, 0, 0)) < 2e-5) out += 1e-6;
+    const Vec3 normal = grain.orientation * Vec3::UnitX(), surface = grain.position + grain.scale * out * normal;
+    Particle small = sample.particles.back(), large = small;
+    ASSERT_EQ(small.role, Role::fine);
+    const double unit = equivalent_diameter(sample, small) / small.scale;
+    small.scale = 0.4e-3 / unit;
+    small.position = surface;
+    large.scale = 1e-3 / unit;
+    large.position = surface + 0.33e-3 * normal;
+    sample.particles.insert(sample.particles.end(), {small, large});
+
+    for (const bool drop : {false, true}) {
+        options.drop_trapped = drop;
+        const Sample swapped = swap_shapes(sample, options, 1, report);
+        EXPECT_EQ(swapped.particles.size() + (drop ? report.trapped.size() : 0), sample.particles.size());
+        int pressed = 0;
+        for (const Particle& fine : swapped.particles) {
+            if (fine.role != Role::fine) continue;
+            for (const Particle& c : swapped.particles) {
+                if (c.role != Role::coarse) continue;
+                const double distance = c.scale * make_shape(swapped.shapes[std::size_t(c.shape)])->distance(c.orientation.conjugate() * (fine.position - c.position) / c.scale);
+                EXPECT_GT(distance, 0);
+                pressed += distance < 0.5 * equivalent_diameter(swapped, fine);
+            }
+        }
+        EXPECT_GT(pressed, 0);
+    }
+}
+
 TEST(SwapShapes, refuse_what_moves_the_skeleton_or_cannot_be_made)
 {
     SwapReport report;
