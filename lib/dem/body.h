@@ -79,6 +79,7 @@ struct ContactSpring {
     int node = 0;               ///< node of the first body, or slot of a sphere contact
     Eigen::Vector3d spring = Eigen::Vector3d::Zero();  ///< elongation [m]
     Eigen::Vector3d normal = Eigen::Vector3d::Zero();  ///< contact normal of the slot (sphere on grid, in the frame of the grid); else zero
+    bool cornered = false;  ///< sphere on grid: it presses on every wall, found so under SphereScheme::automatic
 };
 
 /// Energy ledger [J]. What comes in by work minus what went is what is there:

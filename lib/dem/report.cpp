@@ -143,7 +143,7 @@ std::vector<ContactSpring> World::contact_springs() const
     for (std::size_t k = 0; k < g.sphere.size(); ++k)
         for (int slot = 0; slot < Slots::count; ++slot)
             if (g.touch[k] && (g.slots[k].used >> slot & 1))
-                list.push_back({g.sphere[k], g.grid[k], slot, g.slots[k].spring[slot], g.slots[k].normal[slot]});
+                list.push_back({g.sphere[k], g.grid[k], slot, g.slots[k].spring[slot], g.slots[k].normal[slot], g.within[k] > 0.0});
     const NodeList& n = m.nodes;
     for (std::size_t p = 0; p < n.slave.size(); ++p)
         for (const NodeContact& c : n.contacts_of(p)) list.push_back({n.slave[p], n.master[p], c.node, c.spring, Vec3::Zero()});
@@ -183,6 +183,7 @@ void World::set_contact_springs(std::span<const ContactSpring> springs)
                 slots.spring[s.node] = s.spring;
                 slots.normal[s.node] = s.normal;
                 m.sphere_grids.touch[k] = 1;
+                if (s.cornered && m.options.sphere_scheme == SphereScheme::automatic && !(m.sphere_grids.within[k] > 0.0)) m.make_pocket_here(k);
             }
         of_nodes.push_back(s);
     }

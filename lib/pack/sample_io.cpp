@@ -132,6 +132,7 @@ void write_contacts(H5File& file, const std::vector<Contact>& contacts, const st
     write_column(file, "/contacts/springs/node", column<std::int32_t>(springs, [](const ContactSpring& s) { return s.node; }));
     write_rows(file, "/contacts/springs/spring", rows(springs, [](const ContactSpring& s) { return s.spring; }));
     write_rows(file, "/contacts/springs/normal", rows(springs, [](const ContactSpring& s) { return s.normal; }));
+    write_column(file, "/contacts/springs/cornered", column<std::int32_t>(springs, [](const ContactSpring& s) { return s.cornered; }));
 }
 
 /// Reads columns that must all have one length, and says which has not.
@@ -293,8 +294,9 @@ void read_contacts(const Reader& in, Sample& sample)
     const auto a = in.indices(s + "first", m, 0, particles), b = in.indices(s + "second", m, -walls, particles),
                node = in.indices(s + "node", m, INT32_MIN, INT32_MAX);
     const auto spring = in.numbers(s + "spring", m, 3), turned = in.numbers(s + "normal", m, 3);
+    const auto cornered = in.file().exists(s + "cornered") ? in.indices(s + "cornered", m, 0, 2) : std::vector<std::int64_t>(m, 0);
     for (std::size_t i = 0; i < m; ++i)
-        sample.springs.push_back({int(a[i]), int(b[i]), int(node[i]), row3(spring, i), row3(turned, i)});
+        sample.springs.push_back({int(a[i]), int(b[i]), int(node[i]), row3(spring, i), row3(turned, i), cornered[i] != 0});
 }
 
 void write_materials(H5File& file, const std::vector<Material>& materials)

@@ -142,6 +142,36 @@ TEST(Groove, two_walls_carry_the_sphere_at_the_height_of_the_wedge)
     }
 }
 
+TEST(Groove, springs_tell_a_new_world_which_spheres_press_on_every_wall)
+{
+    // Found in the corner, then moved to where one wall alone touches: another world that gets pose and springs has the same force, by the law of
+    // all walls and not by that of the nearest.
+    const double r = 1e-3;
+    const auto block = carved(groove(Vec3(0, 0, -1.5e-3), Quat::Identity()), 4e-3, 2e-4);
+    World world = cavity_world(block, SphereScheme::automatic, Vec3::Zero(), 0.3, 0.0);
+    const int b = add_sphere(world, 1, 2 * r, Vec3(0, 0, 2 * r - 1.5e-3 - 1e-5));
+    world.advance(1e-5);
+    const Vec3 out = Vec3(std::sqrt(0.75), 0, 0.5);  // normal of one wall is (-cos 30, 0, sin 30)
+    world.set_pose(b, world.position(b) + 2e-3 * Vec3(out.z(), 0, out.x()), Quat::Identity());
+    world.relax(1e300, 0);  // evaluated as it stands
+    ASSERT_EQ(world.contacts().size(), 1u);
+    const std::vector<ContactSpring> springs = world.contact_springs();
+    ASSERT_FALSE(springs.empty());
+    EXPECT_TRUE(springs[0].cornered);
+
+    const auto force_with = [&](std::vector<ContactSpring> kept, bool known) {
+        World other = cavity_world(block, SphereScheme::automatic, Vec3::Zero(), 0.3, 0.0);
+        add_sphere(other, 1, 2 * r, world.position(b));
+        for (ContactSpring& s : kept) s.cornered = known && s.cornered;
+        other.set_contact_springs(kept);
+        other.relax(1e300, 0);
+        return other.contacts().at(0).normal_force.norm();
+    };
+    const double force = world.contacts()[0].normal_force.norm();
+    EXPECT_NEAR(force_with(springs, true) / force, 1.0, 1e-9);
+    EXPECT_GT(std::abs(force_with(springs, false) / force - 1.0), 1e-3) << "one wall in reach: not found anew";
+}
+
 TEST(Groove, sphere_rolls_down_on_both_walls)
 {
     // The contact points are R sin 30 below the axis of rotation: a = g sin(slope)/(1 + 0.4/sin^2 30).
