@@ -151,8 +151,8 @@ TEST(Groove, springs_tell_a_new_world_which_spheres_press_on_every_wall)
     World world = cavity_world(block, SphereScheme::automatic, Vec3::Zero(), 0.3, 0.0);
     const int b = add_sphere(world, 1, 2 * r, Vec3(0, 0, 2 * r - 1.5e-3 - 1e-5));
     world.advance(1e-5);
-    const Vec3 out = Vec3(std::sqrt(0.75), 0, 0.5);  // normal of one wall is (-cos 30, 0, sin 30)
-    world.set_pose(b, world.position(b) + 2e-3 * Vec3(out.z(), 0, out.x()), Quat::Identity());
+    const Vec3 along(0.5, 0, std::sqrt(0.75));  // one wall, whose normal is (-cos 30, 0, sin 30)
+    world.set_pose(b, world.position(b) + 2e-3 * along, Quat::Identity());
     world.relax(1e300, 0);  // evaluated as it stands
     ASSERT_EQ(world.contacts().size(), 1u);
     const std::vector<ContactSpring> springs = world.contact_springs();
