@@ -15,7 +15,8 @@ include $(dir $(lastword $(MAKEFILE_LIST)))common.mk
 #:   SCALE=paper                 the full case: 50 and 3900, 1.8 million cells; specs/paper.toml
 #:   SEEDS=n                     n packings of each sample; reports then show mean and spread
 #:   CT=stack VOXEL=30um         your grains, scaled to 15 mm; otherwise coral-like ones of make-sample-ct
-#:   DURATION, CELL, SPACING, HOLE, PITCH, THREADS as above; SPEC, SPEC_SPHERES other packings; OUT, default build/studies/<SCALE>
+#:   DURATION, CELL, SPACING, HOLE, PITCH, THREADS as above; DEM_STEP of contact (SCALE=paper: 2us, as there)
+#:   SPEC, SPEC_SPHERES          other packings; OUT, default build/studies/<SCALE>
 #:   -j 2 THREADS=1              two runs at a time
 #:   FINISHED=yes                report of the runs that are there, without making any
 #:   make -C pipeline slurm STUDY=voids SCALE=paper SEEDS=5
@@ -39,8 +40,8 @@ endif
 # What the scales differ in.
 # PITCH: the paper does not say how far apart the holes of its filter are. With webs of a third of a hole, three fifths open, conductivity and gradient
 # take the paper's course; with a quarter open (what make-case takes by itself) fines bridge the webs and little leaves (docs/validation/suffusion.md).
-defaults_small := SPACING=400um CELL=0.75mm DURATION=1s HOLE=6mm PITCH=7.7mm SAMPLE_VOXEL=0.25mm
-defaults_paper := SPACING=200um CELL=0.5mm DURATION=2s HOLE=6mm PITCH=7.7mm SAMPLE_VOXEL=0.15mm
+defaults_small := SPACING=400um CELL=0.75mm DURATION=1s HOLE=6mm PITCH=7.7mm SAMPLE_VOXEL=0.25mm SAMPLE_GRAINS=10
+defaults_paper := SPACING=200um CELL=0.5mm DURATION=2s HOLE=6mm PITCH=7.7mm SAMPLE_VOXEL=0.15mm SAMPLE_GRAINS=50 DEM_STEP=2us
 $(foreach setting,$(defaults_$(SCALE)),$(eval $(firstword $(subst =, ,$(setting))) ?= $(lastword $(subst =, ,$(setting)))))
 SCALE_TO ?= 15mm
 # Samples that differ by shape are compared at the same pressure: without it harmonics leave the small sample at four times what it had, and
@@ -77,7 +78,7 @@ list:
 ifeq ($(CT),)
 stack := $(out)/grains.tif
 stack_file := $(stack)
-phantom := $(bin)/make-sample-ct --grains 10 --sticks 1 --diameter 15mm --spread 0.1 --porosity 0.3 --voxel-size $(SAMPLE_VOXEL) --seed 1 $(threads)
+phantom := $(bin)/make-sample-ct --grains $(SAMPLE_GRAINS) --sticks 1 --diameter 15mm --spread 0.1 --porosity 0.3 --voxel-size $(SAMPLE_VOXEL) --seed 1 $(threads)
 $(out)/.phantom.options: always
 	$(call remember,$(notdir $(firstword $(phantom))) $(wordlist 2,99,$(phantom)))
 $(stack): $(out)/.phantom.options | $(bin)/make-sample-ct
@@ -110,14 +111,15 @@ $(out)/samples/$(1)_seed$(3).h5: $(out)/samples/ls-sphere_seed$(3).h5 $(out)/sam
 	@$(bin)/swap-shapes $$< $(2) --seed $(3) $(SWAP_OPTIONS) $(threads) -o $$@
 endef
 
+case_options := $(call option,--hole,HOLE) $(call option,--pitch,PITCH) $(call option,--cell,CELL) $(call option,--duration,DURATION) $(call option,--dem-step,DEM_STEP) \
+    $(CASE_OPTIONS)
 # $(call run_rule,RUN,SAMPLE,VELOCITY,ANGLE,SEED): case and coupled run.
 define run_rule
 $(out)/$(1)/seed$(5)/.case.options: always
-	$$(call remember,make-case --velocity $(3) --angle $(4) $(call option,--hole,HOLE) $(call option,--pitch,PITCH) $(call option,--cell,CELL) $(call option,--duration,DURATION) $(CASE_OPTIONS))
+	$$(call remember,make-case --velocity $(3) --angle $(4) $(case_options))
 $(out)/$(1)/seed$(5)/case.toml: $(out)/samples/$(2)_seed$(5).h5 $(out)/$(1)/seed$(5)/.case.options | $(bin)/make-case
 	$$(call say,make-case: $(1)$$(comma) seed $(5))
-	@$(bin)/make-case $$< --velocity $(3) --angle $(4) $(call option,--hole,HOLE) $(call option,--pitch,PITCH) $(call option,--cell,CELL) $(call option,--duration,DURATION) \
-	    $(CASE_OPTIONS) $(threads) -o $$(@D)
+	@$(bin)/make-case $$< --velocity $(3) --angle $(4) $(case_options) $(threads) -o $$(@D)
 $(out)/$(1)/seed$(5)/suffuse.txt: $(out)/$(1)/seed$(5)/case.toml | $(bin)/suffuse
 	$$(call say,suffuse: $(1)$$(comma) seed $(5))
 	@$$(call resumable,$$(@D)/checkpoint.h5,$$<); $(bin)/suffuse $$(@D) $(threads) $$$$resume >$$@.part
@@ -159,8 +161,8 @@ slurm:
 	@[ -n '$(study_$(STUDY))' ] || { echo "STUDY=$(STUDY) is not one of: $(studies)" >&2; exit 1; }
 	@mkdir -p $(out)
 	@$(here)/slurm.sh '$(here)/studies.mk' '$(STUDY)' '$(out)' '$(out)/grains.vdb' '$(samples_of)' '$(call results_of,$(STUDY))' \
-	    $(foreach name,SCALE SEEDS OUT CT VOXEL SOLID SPLIT THRESHOLD LABELS SCALE_TO SPACING CSCT2LS_OPTIONS SPEC SPEC_SPHERES CELL DURATION HOLE PITCH PACK_OPTIONS \
-	        SWAP_OPTIONS SWAP_SH CASE_OPTIONS REPORT_OPTIONS SAMPLE_VOXEL bin,'$(name)=$(if $(filter OUT,$(name)),$(out),$(if $(filter CT,$(name)),$(if $(CT),$(stack)),$(if $(filter \
+	    $(foreach name,SCALE SEEDS OUT CT VOXEL SOLID SPLIT THRESHOLD LABELS SCALE_TO SPACING CSCT2LS_OPTIONS SPEC SPEC_SPHERES CELL DURATION HOLE PITCH DEM_STEP PACK_OPTIONS \
+	        SWAP_OPTIONS SWAP_SH CASE_OPTIONS REPORT_OPTIONS SAMPLE_VOXEL SAMPLE_GRAINS bin,'$(name)=$(if $(filter OUT,$(name)),$(out),$(if $(filter CT,$(name)),$(if $(CT),$(stack)),$(if $(filter \
 	        SPEC,$(name)),$(spec),$(if $(filter SPEC_SPHERES,$(name)),$(spec_spheres),$($(name))))))') >$(out)/$(STUDY).slurm.part
 	@chmod +x $(out)/$(STUDY).slurm.part && mv $(out)/$(STUDY).slurm.part $(out)/$(STUDY).slurm.sh
 	@echo "jobs: $(out)/$(STUDY).slurm.sh"

@@ -32,6 +32,7 @@ void declare(coral::cli::Options& options, Options& o)
     options.quantity("--cell", o.plan.cell, Dimension::length, "Edge of the flow cells; 0: a thirtieth of the smallest coarse grain");
     options.add("--lid", o.lid, "Upper wall of the packing: keep (holds the grains, water passes), or remove (a compressed sample springs up)").one_of({"keep", "remove"});
     options.quantity("--duration", o.plan.duration, Dimension::time, "Length of the run");
+    options.quantity("--dem-step", o.plan.dem_step, Dimension::time, "Step of contact; 0: 0.3 of the critical one");
     options.add("--engine", o.engine, "Flow solver: embedded or openfoam");
     options.flag("--explain", o.explain, "Print the plan and the errors to expect, and write nothing");
 }

@@ -115,7 +115,10 @@ void predict(Plan& plan, const pack::Sample& sample)
     plan.flow_step = std::min(TimeSpec{}.max_step, (staged ? fluid::runge_kutta_reach : 1) / (15 * nu / (dx * dx) + speed / (dx * TimeSpec{}.cfl)));
     dem::World world(pack::world_options(sample));
     pack::add_sample(world, sample);
-    plan.dem_step = world.auto_time_step();
+    if (const double critical = world.critical_time_step(); plan.options.dem_step > 1.5 * critical)
+        throw UsageError("--dem-step", "is " + format_quantity(plan.options.dem_step, Dimension::time) + ", above 1.5 of the critical step, " +
+                                           format_quantity(critical, Dimension::time) + " of the lightest grain", "give 0 for 0.3 of it");
+    plan.dem_step = plan.options.dem_step > 0 ? plan.options.dem_step : world.auto_time_step();
     plan.flow_steps = plan.options.duration / plan.flow_step;
     plan.dem_steps = plan.options.duration / plan.dem_step;
     const double cells = plan.domain.cells.cast<double>().prod();
@@ -178,6 +181,7 @@ Plan make_plan(const pack::Sample& sample, const PlanOptions& options)
     if (smallest_coarse <= 0) throw Error("sample", "has no coarse grains", "pack a population with role = \"coarse\"");
     if (!(options.velocity > 0)) throw UsageError("--velocity", "is " + to_text(options.velocity) + " m/s: the inlet is closed", "give a speed above zero");
     if (!(options.duration > 0)) throw UsageError("--duration", "is " + to_text(options.duration) + " s", "give a time above zero");
+    if (!(options.dem_step >= 0)) throw UsageError("--dem-step", "is " + to_text(options.dem_step) + " s", "give a time above zero, or 0 for 0.3 of the critical step");
     if (plan.options.hole == 0) plan.options.hole = 0.4 * smallest_coarse;
     if (plan.options.cell == 0) plan.options.cell = smallest_coarse / 30;
     const double width = std::min(sample.size.x(), sample.size.y());
@@ -253,8 +257,10 @@ std::string case_text(const Plan& plan, const pack::Sample& sample, const std::s
     if (plan.domain.size.y() > plan.sample_size.y() * (1 + 1e-9))
         text += fmt::format("[[wall]]                  # the sample is not a whole number of cells deep\ntype = \"plane\"\npoint = [0, 0, 0]\nnormal = [0, 1, 0]\n\n"
                             "[[wall]]\ntype = \"plane\"\npoint = [0, {}, 0]\nnormal = [0, -1, 0]\n\n", to_text(plan.sample_size.y()));
-    text += fmt::format("[time]\nduration = {}        # s\ndem_step = \"auto\"       # about {} here\ncfl = {}\nmax_step = {}      # s\n\n", to_text(plan.options.duration),
-                        format_quantity(plan.dem_step, Dimension::time), to_text(TimeSpec{}.cfl), to_text(TimeSpec{}.max_step));
+    const std::string dem_step = plan.options.dem_step > 0 ? to_text(plan.dem_step) + "          # s; \"auto\" is 0.3 of the critical step"
+                                                           : "\"auto\"       # about " + format_quantity(plan.dem_step, Dimension::time) + " here";
+    text += fmt::format("[time]\nduration = {}        # s\ndem_step = {}\ncfl = {}\nmax_step = {}      # s\n\n", to_text(plan.options.duration),
+                        dem_step, to_text(TimeSpec{}.cfl), to_text(TimeSpec{}.max_step));
     text += fmt::format("[output]\ninterval = {}        # s, series\nframes = {}           # s, fields and bodies for viewing; \"none\" to leave out\ntrack = \"all\"            # or a list of body numbers\n",
                         to_text(plan.options.duration / 400), to_text(plan.options.duration / 40));
     return text;

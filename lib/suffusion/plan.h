@@ -17,6 +17,7 @@ struct PlanOptions {
     double pitch = 0;       ///< distance of their centres, made to divide the sample's width [m]; 0: two edges (a quarter of the plate is open)
     double cell = 0;        ///< [m]; 0: a thirtieth of the smallest coarse diameter (0.5 mm for 15 mm grains)
     double duration = 2;    ///< [s]
+    double dem_step = 0;    ///< of contact [s]; 0: 0.3 of the critical step
     /// Whether the upper wall of the packing stays, as the perforated plate of an oedometer: for grains only, water passes. Without it a
     /// compressed sample springs up when the run starts.
     bool lid = true;

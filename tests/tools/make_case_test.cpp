@@ -53,6 +53,19 @@ TEST(MakeCase, sets_the_holes_as_far_apart_as_asked)
     EXPECT_FALSE(std::filesystem::exists(folder.path() / "narrow"));
 }
 
+TEST(MakeCase, takes_the_contact_step_as_asked_and_refuses_one_above_critical)
+{
+    const ScratchFolder folder;
+    pack::write_sample(small_sample(true), folder.path() / "sample.h5");
+    const ProgramResult made = run_program("make-case sample.h5 -o case --cell 1mm --dem-step 0.5us", folder.path());
+    ASSERT_EQ(made.exit_code, 0) << made.err;
+    EXPECT_DOUBLE_EQ(suffusion::read_case(folder.path() / "case").time.dem_step, 0.5e-6);
+    const ProgramResult refused = run_program("make-case sample.h5 -o coarse --cell 1mm --dem-step 1ms", folder.path());
+    EXPECT_EQ(refused.exit_code, 2);
+    EXPECT_NE(refused.err.find("--dem-step"), std::string::npos) << refused.err;
+    EXPECT_FALSE(std::filesystem::exists(folder.path() / "coarse"));
+}
+
 TEST(MakeCase, plans_the_contact_steps_that_the_run_takes_for_angular_fines_too)
 {
     const ScratchFolder folder;
