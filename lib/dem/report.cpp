@@ -126,6 +126,21 @@ Statistics World::statistics() const
     return s;
 }
 
+std::vector<int> World::swallowed() const
+{
+    impl_->refresh_forces();
+    const Impl& m = *impl_;
+    const SphereGridList& near = m.sphere_grids;
+    std::vector<int> inside;
+    for (std::size_t k = 0; k < near.sphere.size(); ++k) {
+        const std::size_t i = std::size_t(near.sphere[k]), j = std::size_t(near.grid[k]);
+        const detail::DistanceField field(*m.shapes[std::size_t(m.shape[j])]);
+        const Vec3 local = m.q[j].conjugate() * m.periodic(m.x[i] - m.x[j]) / m.scale[j];
+        if (m.scale[j] * field.distance(local) <= -m.radius[i] && (inside.empty() || inside.back() != int(i))) inside.push_back(int(i));
+    }
+    return inside;
+}
+
 // ---- Friction springs ----
 
 std::vector<ContactSpring> World::contact_springs() const

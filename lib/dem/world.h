@@ -142,6 +142,9 @@ public:
     /// Starts the energy ledger anew.
     void reset_energy();
     Statistics statistics() const;
+    /// Spheres that lie wholly inside the solid of another body: the greatest force of the contact law could not hold them, and they feel
+    /// nothing of that body any more. Ordered.
+    std::vector<int> swallowed() const;
     const Counters& counters() const;
     ///@}
 

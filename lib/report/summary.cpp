@@ -65,6 +65,19 @@ double counted_fines(const CaseData& data, std::size_t step)
     return count;
 }
 
+/// Greatest error of the energy ledger over the greatest energy stored in the bodies and their contacts; 0 where the series are not there.
+double energy_error(const CaseData& data)
+{
+    const Series *closure = data.find("energy_closure"), *kinetic = data.find("kinetic_energy"), *elastic = data.find("elastic_energy");
+    if (!closure || !kinetic || !elastic) return 0;
+    double error = 0, stored = 0;
+    for (std::size_t n = 0; n < closure->steps(); ++n) {
+        error = std::max(error, std::abs(closure->at(n)));
+        stored = std::max(stored, kinetic->at(n) + elastic->at(n));
+    }
+    return stored > 0 ? error / stored : 0;
+}
+
 void warn(const CaseData& data, Summary& summary)
 {
     if (data.duration > 0 && summary.end_time < data.duration * (1 - 1e-6))
@@ -83,6 +96,11 @@ void warn(const CaseData& data, Summary& summary)
     if (sealed > 0.2 * between)
         summary.warnings.push_back("Water moves at " + short_number(100 * sealed / between, 2) + " % of the speed between the grains in voids that have no way out, where it should be at rest: "
                                    "walls in the grains are too thin for the flow cells, and the velocity inside grains is overstated. A finer --cell helps; a wall needs 1.5 cells.");
+    if (const double swallowed = last_of(data, "swallowed_count"); swallowed > 0)
+        summary.warnings.push_back(short_number(swallowed, 9) + " fines were pressed wholly into the solid of grains and feel nothing of them any more: loads are higher than this contact stiffness can carry. "
+                                   "A higher normal_stiffness helps.");
+    if (const double error = energy_error(data); error > 0.01)
+        summary.warnings.push_back("The ledger of energy is off by up to " + short_number(100 * error, 2) + " % of what bodies and contacts held at most.");
     if (summary.mass_error > 1e-3 && data.find("mass_balance_error")->unit == "1")
         summary.warnings.push_back("The mass balance is off by up to " + short_number(summary.mass_error, 2) + " (relative).");
     if (summary.momentum_error > 1e-2 && data.find("momentum_balance_error")->unit == "1")

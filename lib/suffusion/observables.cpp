@@ -264,6 +264,7 @@ void Observer::record_contacts(const Simulation& simulation)
     put("contact_anisotropy_coarse_error", "1", of_coarse.error);
     const int active = scene.world.active_count();
     put("coordination", "1", active > 0 ? 2 * fabric.count / active : 0);
+    put("swallowed_count", "1", static_cast<double>(scene.world.swallowed().size()));
     const dem::Energy energy = scene.world.energy();
     put("kinetic_energy", "J", energy.kinetic);
     put("elastic_energy", "J", energy.elastic_normal + energy.elastic_tangential);

@@ -236,6 +236,18 @@ TEST(SphereOnGrid, fast_sphere_does_not_tunnel_through_a_thin_wall)
     EXPECT_GT(world.velocity(b).z(), 0.3);
 }
 
+TEST(SphereOnGrid, swallowed_spheres_are_told_from_those_that_touch_or_lie_in_a_void)
+{
+    World world = quiet_world(0.0, 0.0);
+    const int sphere = world.add_shape(Shape::sphere()), shell = world.add_shape(hollow_ball(6e-3, 3e-3, 0.2e-3, 3000, 2e-3));
+    add_grid(world, shell, Vec3::Zero(), Vec3::Zero(), Vec3::Zero(), Quat::Identity(), Motion::fixed);
+    add_sphere(world, sphere, 2e-3, {0, 0, 6.5e-3});                          // presses from outside
+    add_sphere(world, sphere, 2e-3, {0, 0, 0.5e-3});                          // in the void
+    const int covered = add_sphere(world, sphere, 1e-3, {0, 4.5e-3, 0});      // wholly in the wall
+    add_sphere(world, sphere, 1e-3, {5.7e-3, 0, 0});                          // deep, but reached by its force
+    EXPECT_EQ(world.swallowed(), std::vector<int>{covered});
+}
+
 TEST(SphereOnGrid, friction_makes_a_ball_roll_down_a_grid_with_momentum_kept)
 {
     World world = quiet_world(0.3, 0.7);

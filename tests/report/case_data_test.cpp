@@ -148,5 +148,24 @@ TEST(Summary, warns_of_a_run_that_stopped_early_or_lost_mass)
     EXPECT_NE(s.warnings[1].find("0.02"), std::string::npos);
 }
 
+TEST(Summary, warns_of_energy_that_comes_from_nowhere_and_of_swallowed_fines)
+{
+    const ScratchFolder scratch;
+    write_example_case(scratch.path() / "ls");
+    CaseData data = read_case(scratch.path() / "ls");
+    const std::size_t steps = data.series["kinetic_energy"].steps();
+    const auto constant = [&](double value) { return Series{.unit = "J", .width = 1, .values = std::vector<double>(steps, value)}; };
+    data.series["elastic_energy"] = constant(0.3);
+    data.series["energy_closure"] = constant(2e-3);
+    data.series["swallowed_count"] = constant(0);
+    EXPECT_TRUE(summarise(data).warnings.empty());
+    data.series["energy_closure"].values[3] = -6e-3;
+    data.series["swallowed_count"].values.back() = 2;
+    const Summary s = summarise(data);
+    ASSERT_EQ(s.warnings.size(), 2u);
+    EXPECT_NE(s.warnings[0].find("2 fines were pressed wholly into"), std::string::npos) << s.warnings[0];
+    EXPECT_NE(s.warnings[1].find("off by up to 2 %"), std::string::npos) << s.warnings[1];
+}
+
 }  // namespace
 }  // namespace coral::report

@@ -295,6 +295,7 @@ TEST(Trapping, tells_the_fine_inside_from_the_one_in_the_mouth_and_the_one_besid
                                        fine({0, 0, 4.8e-3}) + fine({5e-3, 0, 0}) + "[time]\nduration = 0.001\n[output]\ninterval = 0.001\n");
     EXPECT_EQ(last(r, "trapped_count"), 2);
     EXPECT_EQ(last(r, "trapped_enclosed"), 1);
+    EXPECT_EQ(last(r, "swallowed_count"), 0);
     EXPECT_EQ(last(r, "trapped_entered"), 0);
     ASSERT_EQ(r.trapped.size(), 2u);
     EXPECT_EQ(r.trapped[0].fine, 1);
