@@ -33,7 +33,7 @@ void declare(cli::Options& options, Options& o)
     options.add("--degree", o.swap.degree, "Degree of harmonics that are fitted here").between(2, 30);
     options.add("--faces", o.swap.faces, "Faces of a polyhedron, at most").between(12, 60);
     options.add("--nodes", o.swap.fine_nodes, "Contact nodes on a fine grain with a new shape").between(100, 20000);
-    options.flag("--drop-trapped", o.swap.drop_trapped, "Take out fines that a filled void covers; else they are moved to its surface");
+    options.flag("--drop-trapped", o.swap.drop_trapped, "Take out fines that a filled void covers, and those that find no place; else the former are moved to its surface");
     options.add("--limit", o.swap.limit, "Largest displacement of a coarse grain, and mean one of the fines, over the diameter").not_negative();
     options.add("--overlap-limit", o.swap.overlap_limit, "Largest overlap that may stay, over the smaller diameter; 0: twice the deepest of the sample, at least 5 %").not_negative();
     options.add("--figure", o.figure, "Picture of the sample, cut open, .png");
@@ -66,6 +66,7 @@ nlohmann::ordered_json to_json(const pack::Sample& sample, const pack::SwapRepor
     json["strain"] = {r.strain.x(), r.strain.y(), r.strain.z()};
     json["pushed_fines"] = r.pushed_fines;
     json["trapped"] = r.trapped;
+    json["wedged"] = r.wedged;
     json["trapped_dropped"] = o.swap.drop_trapped;
     json["overlaps"] = {{"before", to_json(r.before)}, {"swapped", to_json(r.swapped)}, {"after", to_json(r.after)}};
     json["springs"] = {{"before", r.springs_before}, {"kept", r.springs_kept}, {"after", sample.springs.size()}};
@@ -98,6 +99,7 @@ std::string to_text(const pack::Sample& sample, const pack::SwapReport& r, const
     line("  of those that carried load", moved(r.loaded_fine));
     if (!r.strain.isZero()) line("strain of the box", fmt::format("{} {} {}", percent(r.strain.x()), percent(r.strain.y()), percent(r.strain.z())));
     line("fines in filled voids", r.trapped.empty() ? "none" : fmt::format("{}, {}: grains {}", r.trapped.size(), o.swap.drop_trapped ? "taken out" : "moved to the surface", fmt::join(r.trapped, " ")));
+    if (!r.wedged.empty()) line("fines without a place", fmt::format("{}, taken out: grains {}", r.wedged.size(), fmt::join(r.wedged, " ")));
     const auto overlaps = [&](const char* name, const pack::Overlaps& v) {
         line(name, fmt::format("{} contacts, {} deeper than 1 % of d, largest {}", v.contacts, v.deep, percent(v.largest)));
     };

@@ -99,11 +99,11 @@ double total_mass(const Sample& sample)
     return sum;
 }
 
-void relax(detail::Replaced& swapped, const Sample& rest, const std::vector<char>& moved_out, const SwapOptions& options, SwapReport& report)
+std::vector<char> relax(detail::Replaced& swapped, const Sample& rest, const std::vector<char>& moved_out, const SwapOptions& options, SwapReport& report)
 {
     report.mass_before = total_mass(rest);
     report.mass_after = total_mass(swapped.sample);
-    detail::relax_swapped(swapped, rest, moved_out, options, report);
+    return detail::relax_swapped(swapped, rest, moved_out, options, report);
 }
 
 }  // namespace
@@ -131,7 +131,8 @@ Sample swap_shapes(const Sample& sample, const SwapOptions& options, std::uint64
             throw Error("swap", "grain " + std::to_string(at - covered.begin()) + " was pushed into a coarse grain by the relaxation", "add --drop-trapped, or take shapes nearer to the old ones");
         return std::move(swapped.sample);
     }
-    // Fines at the mouth of a void may be pushed into the new shape while the sample relaxes: they go too, and it relaxes again without them.
+    // Fines at the mouth of a void may be pushed into the new shape while the sample relaxes, and others find no place between new shapes: they go
+    // too, and it relaxes again without them.
     Sample rest = sample;
     std::vector<int> number(sample.particles.size());  // in the sample, of the grains that stay
     std::iota(number.begin(), number.end(), 0);
@@ -139,13 +140,19 @@ Sample swap_shapes(const Sample& sample, const SwapOptions& options, std::uint64
         take_out(out, swapped, rest, number);
         detail::Replaced relaxed = swapped;
         SwapReport of_this = report;
-        relax(relaxed, rest, std::vector<char>(rest.particles.size(), 0), options, of_this);
+        const std::vector<char> wedged = relax(relaxed, rest, std::vector<char>(rest.particles.size(), 0), options, of_this);
         out = covered_fines(relaxed.sample, rest, false);
-        for (std::size_t i = 0; i < out.size(); ++i)
+        bool again = false;
+        for (std::size_t i = 0; i < out.size(); ++i) {
             if (out[i]) report.trapped.push_back(number[i]);
-        if (report.trapped.size() > of_this.trapped.size()) continue;
+            else if (wedged[i]) report.wedged.push_back(number[i]);
+            out[i] = out[i] || wedged[i];
+            again |= out[i];
+        }
+        if (again) continue;
         report = std::move(of_this);
         std::sort(report.trapped.begin(), report.trapped.end());
+        std::sort(report.wedged.begin(), report.wedged.end());
         return std::move(relaxed.sample);
     }
 }

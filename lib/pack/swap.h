@@ -19,7 +19,7 @@ struct SwapOptions {
     int degree = 10;                ///< of harmonics that are fitted here
     int faces = 26;                 ///< of polyhedra, at most
     int fine_nodes = 500;           ///< surface nodes of new fine shapes
-    bool drop_trapped = false;      ///< fines whose centre a new coarse shape covers, now or while the sample relaxes, are taken out; else they are moved to its surface
+    bool drop_trapped = false;      ///< fines whose centre a new coarse shape covers, now or while the sample relaxes, and those that stay deeper than the overlap limit are taken out; else the former are moved to its surface
     double limit = 0.15;            ///< refused: a coarse grain, or the mean of the fines, displaced by more of its diameter [-]
     double overlap_limit = 0;       ///< refused: an overlap that stays above this share of the smaller diameter [-]; 0: twice the sample's deepest, at least 5 %
     bool restore_pressure = false;  ///< walls move until each pair has the pressure it had
@@ -43,6 +43,7 @@ struct SwapReport {
     int new_shapes = 0;                        ///< templates made
     int smallest_faces = 0, largest_faces = 0; ///< of the polyhedra made
     std::vector<int> trapped;                  ///< fines whose centre lay in a filled void: taken out, or moved to the surface
+    std::vector<int> wedged;                   ///< fines that found no place between the new shapes, taken out
     Displacement coarse, fine;                 ///< by the relaxation; those moved out of filled voids are left out
     Displacement loaded_fine;                  ///< of the fines that carried load before: two contacts or more, and more than their own weight
     Eigen::Vector3d strain = Eigen::Vector3d::Zero();  ///< of the box by moving walls, positive when it becomes smaller [-]

@@ -249,12 +249,33 @@ void measure_displacements(const dem::World& world, const Sample& sample, const 
     report.loaded_fine = displacement(std::move(carrying));
 }
 
+/// Overlap over the smaller diameter above which a swap is refused.
+double deepest_allowed(const SwapOptions& options, const SwapReport& report)
+{
+    return options.overlap_limit > 0 ? options.overlap_limit : std::max(least_overlap_limit, 2 * report.before.largest);
+}
+
+/// Fines that are still deeper than allowed in a grain or a wall; of two fines the smaller.
+std::vector<char> wedged_fines(const dem::World& world, const Sample& sample, double allowed)
+{
+    std::vector<char> wedged(sample.particles.size(), 0);
+    const auto is_fine = [&](int i) { return i >= 0 && sample.particles[std::size_t(i)].role == Role::fine; };
+    for (const dem::Contact& c : world.contacts()) {
+        double d = 2 * world.equivalent_radius(c.first);
+        if (c.second >= 0) d = std::min(d, 2 * world.equivalent_radius(c.second));
+        if (c.overlap <= allowed * d) continue;
+        const bool second = is_fine(c.second) && (!is_fine(c.first) || world.equivalent_radius(c.second) < world.equivalent_radius(c.first));
+        if (second || is_fine(c.first)) wedged[std::size_t(second ? c.second : c.first)] = 1;
+    }
+    return wedged;
+}
+
 /// Refuses what would burst the sample, or is no longer the same sample.
 void check(const dem::World& world, const Box& box, const SwapOptions& options, const SwapReport& report)
 {
-    const std::string help = report.trapped.empty() || options.drop_trapped ? "take shapes nearer to the old ones (a higher --degree, more --faces), or raise the limit"
+    const std::string help = options.drop_trapped ? "take shapes nearer to the old ones (a higher --degree, more --faces), or raise the limit"
                                                                            : "add --drop-trapped, or take shapes nearer to the old ones";
-    const double deepest = options.overlap_limit > 0 ? options.overlap_limit : std::max(least_overlap_limit, 2 * report.before.largest);
+    const double deepest = deepest_allowed(options, report);
     if (report.after.largest > deepest)
         throw Error("swap", "grains still overlap by " + percent(report.after.largest) + " of the smaller diameter after the relaxation (" +
                                 percent(report.swapped.largest) + " before it; --overlap-limit is " + percent(deepest) + ")", help);
@@ -267,7 +288,7 @@ void check(const dem::World& world, const Box& box, const SwapOptions& options, 
 
 }  // namespace
 
-void relax_swapped(Replaced& swapped, const Sample& before, const std::vector<char>& moved_out, const SwapOptions& options, SwapReport& report)
+std::vector<char> relax_swapped(Replaced& swapped, const Sample& before, const std::vector<char>& moved_out, const SwapOptions& options, SwapReport& report)
 {
     Sample& sample = swapped.sample;
     report.pressure_before = before.statistics.mean_pressure;
@@ -285,7 +306,7 @@ void relax_swapped(Replaced& swapped, const Sample& before, const std::vector<ch
         report.pressure_after = report.pressure_before;
         report.unbalanced_ratio = balance(old).unbalanced_ratio;
         report.kinetic_energy = before.statistics.kinetic_energy;
-        return;
+        return std::vector<char>(sample.particles.size(), 0);
     }
     const std::vector<char> loaded = loaded_grains(before);
     set_coarse(world, sample, dem::Motion::fixed);
@@ -301,6 +322,8 @@ void relax_swapped(Replaced& swapped, const Sample& before, const std::vector<ch
     report.after = overlaps(world);
     measure_displacements(world, sample, moved_out, loaded, options.limit, report);
     report.strain = (before.size - (box.upper(world) - box.lower(world))).cwiseQuotient(before.size);
+    std::vector<char> wedged = wedged_fines(world, sample, deepest_allowed(options, report));
+    if (options.drop_trapped && std::find(wedged.begin(), wedged.end(), 1) != wedged.end()) return wedged;
     check(world, box, options, report);
     if (!report.relaxed)
         report.warnings.push_back("the damped run ended after " + std::to_string(report.steps) + " steps with an unbalanced ratio of " +
@@ -311,6 +334,7 @@ void relax_swapped(Replaced& swapped, const Sample& before, const std::vector<ch
     rest.kinetic_ratio = b.kinetic_ratio;
     measure(world, box, rest, world.auto_time_step(), std::int64_t(before.statistics.dem_steps) + world.counters().steps, sample);
     report.pressure_after = sample.statistics.mean_pressure;
+    return wedged;
 }
 
 }  // namespace coral::pack::detail

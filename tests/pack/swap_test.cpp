@@ -244,6 +244,29 @@ TEST(SwapShapes, a_fine_in_a_filled_void_is_listed_and_moved_out_or_taken_out)
     EXPECT_GT((moved.particles.back().position - inside.position).norm(), 3e-4);
 }
 
+TEST(SwapShapes, a_fine_without_a_place_is_taken_out_or_refused)
+{
+    Sample sample = packed();
+    Particle huge = sample.particles.back();
+    ASSERT_EQ(huge.role, Role::fine);
+    huge.scale *= 0.7 * sample.size.minCoeff() / equivalent_diameter(sample, huge);  // wherever it goes, coarse grains are in its way
+    huge.position = 0.5 * sample.size;
+    SwapOptions options = coarse_to(ShapeKind::sh);
+    options.limit = 10;
+    options.overlap_limit = 0.05;
+    options.max_steps = 300;
+    sample.particles.push_back(huge);
+    SwapReport report;
+    EXPECT_THROW(swap_shapes(sample, options, 1, report), coral::Error);
+    options.drop_trapped = true;
+    const Sample swapped = swap_shapes(sample, options, 1, report);
+    std::vector<int> out = report.wedged;
+    out.insert(out.end(), report.trapped.begin(), report.trapped.end());
+    EXPECT_TRUE(std::ranges::find(out, int(sample.particles.size()) - 1) != out.end());
+    EXPECT_EQ(swapped.particles.size(), sample.particles.size() - out.size());
+    EXPECT_LE(report.after.largest, 0.05);
+}
+
 TEST(SwapShapes, a_fine_pushed_against_a_new_shape_does_not_end_inside_it)
 {
     // A fine whose centre is just outside the new surface, and a larger one that overlaps it from outside.

@@ -74,6 +74,7 @@ struct Replaced {
 Replaced replace(const Sample& sample, const SwapOptions& options, std::uint64_t seed, SwapReport& report);
 
 /// Relaxes the new sample and measures it. `before` has the same grains; `moved_out` lies beside them.
-void relax_swapped(Replaced& swapped, const Sample& before, const std::vector<char>& moved_out, const SwapOptions& options, SwapReport& report);
+/// Returns which fines found no place: with drop_trapped, any of them ends the work unmeasured, to be done again without them.
+std::vector<char> relax_swapped(Replaced& swapped, const Sample& before, const std::vector<char>& moved_out, const SwapOptions& options, SwapReport& report);
 
 }  // namespace coral::pack::detail
