@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include "core/error.h"
 #include "core/parallel.h"
@@ -102,6 +103,8 @@ void Observer::put(const char* name, const char* unit, std::span<const double> v
     Column& column = results_.column(name);
     column.unit = unit;
     column.width = values.size();
+    // A version that did not know the series began the run.
+    if (column.values.empty()) column.values.assign(rows_before_ * column.width, std::numeric_limits<double>::quiet_NaN());
     column.values.insert(column.values.end(), values.begin(), values.end());
 }
 
@@ -121,6 +124,7 @@ void Observer::follow(const Simulation& simulation)
 void Observer::record(Simulation& simulation)
 {
     follow(simulation);
+    rows_before_ = results_.rows();
     put("time", "s", simulation.time());
     record_erosion(simulation);
     record_trapping(simulation);

@@ -61,6 +61,7 @@ private:
     std::vector<Trapped> trapped_;                      ///< at the last output
     ThroatLibrary throats_;
     double last_time_ = 0;                              ///< of the last output [s]
+    std::size_t rows_before_ = 0;                       ///< outputs before the one being recorded
 };
 
 }  // namespace coral::suffusion

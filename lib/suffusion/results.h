@@ -30,7 +30,7 @@ struct Results {
     std::vector<std::int64_t> tracked;    ///< /trajectories/id: body numbers
     std::vector<Column> trajectories;     ///< /trajectories/<name> [nt, m(, width)]
     std::vector<std::int64_t> fines;      ///< /migration/id
-    std::vector<double> path_length;      ///< moves summed over the outputs [m]
+    std::vector<double> path_length;      ///< followed through every step [m]
     std::vector<double> net_displacement; ///< [m]
     std::vector<std::int64_t> layer;      ///< at the start: 0 bottom ... layers - 1 top
     std::vector<std::int64_t> eroded;     ///< 1 once below the filter plate

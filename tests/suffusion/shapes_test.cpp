@@ -199,6 +199,27 @@ TEST(CaseShapes, a_dry_run_stopped_and_resumed_ends_as_one_never_stopped_for_any
     EXPECT_NE(read_text_file(scratch.path() / "whole/frames/surfaces.pvd").find("surfaces_00001.vtu"), std::string::npos);
 }
 
+TEST(CaseShapes, a_run_that_began_without_a_series_goes_on_with_it)
+{
+    const Scratch scratch;
+    const std::filesystem::path folder = scratch.write("case/case.toml", dry).parent_path();
+    RunOptions options;
+    options.until = 0.0031;
+    run_case(folder, options);
+    Results results = read_results(folder / "results.h5");
+    const std::size_t rows = results.rows();
+    std::erase_if(results.series, [](const Column& c) { return c.name == "coordination"; });
+    write_results(folder / "results.h5", results);
+    options.until = 1;
+    options.resume = true;
+    run_case(folder, options);
+    results = read_results(folder / "results.h5");
+    const std::vector<double>& values = results.column("coordination").values;
+    ASSERT_GT(results.rows(), rows);
+    ASSERT_EQ(values.size(), results.rows());
+    for (std::size_t n = 0; n < values.size(); ++n) EXPECT_EQ(std::isnan(values[n]), n < rows) << n;
+}
+
 TEST(CaseShapes, flow_sees_the_volume_of_the_body)
 {
     // Eq. 9 of docs/numerics.md loses a little at sharp edges: 1 % of an octahedron 20 cells across.
