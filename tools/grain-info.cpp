@@ -55,6 +55,7 @@ void run(const std::vector<std::string>& files, bool values, const cli::Context&
             try {
                 return describe(file, values);
             } catch (const UsageError& error) {
+                if (!fs::exists(file) && file.find(".h5:") == file.npos) throw;
                 throw Error("", error.what());  // the file is wrong, not the command line
             }
         }();

@@ -11,6 +11,7 @@
 
 #include "cli.h"
 #include "core/error.h"
+#include "core/output_file.h"
 #include "core/parallel.h"
 #include "core/progress.h"
 #include "core/table.h"
@@ -294,10 +295,18 @@ void summarise_import(const sh::ImportedSet& set, const Options& o, const cli::C
     cli::print_summary(context, json, human + o.output.string() + "\n");
 }
 
+/// Before any work: the folders are there and writable.
+void check_outputs(const Options& o)
+{
+    for (const std::filesystem::path& file : {o.output, o.table, o.convergence})
+        if (!file.empty()) OutputFile{file};
+}
+
 void run_import(const Options& o, bool degree_given, const cli::Context& context)
 {
     if (o.tolerance > 0 || !o.convergence.empty() || o.force || o.skip) throw UsageError("--import", "there is nothing to fit", "leave out --tolerance, --convergence, --force and --skip");
     if (o.unit < 0 || o.scale_to < 0) throw UsageError("--unit, --scale-to", "must be lengths greater than zero");
+    check_outputs(o);
     const sh::ImportedSet set = sh::import_shapes(o.import, {o.unit, o.scale_to, degree_given ? o.degree : 0});
     warn_of_differences(set);
     RecordEntry record = context.record;
@@ -319,6 +328,7 @@ void run(const Options& o, const cli::Context& context)
     if (o.unit != 0 || o.scale_to != 0) throw UsageError("--unit, --scale-to", "belong to --import", "level sets have their size");
     if (o.force && o.skip) throw UsageError("--force, --skip", "exclude each other");
     if (o.tolerance < 0 || o.tolerance >= 1) throw UsageError("--tolerance", "must lie between 0 and 1", "2% is a usual value");
+    check_outputs(o);
     const sdf::GrainReader reader(o.input);
     std::vector<Fitted> fitted = fit_all(reader, o);
     const std::size_t left_out = sort_out(fitted, o);

@@ -1,6 +1,8 @@
 // make-case: from a packed sample to a suffusion case, with the plan of the run.
 #include "cli.h"
 
+#include <spdlog/spdlog.h>
+
 #include <filesystem>
 
 #include "core/error.h"
@@ -33,7 +35,7 @@ void declare(coral::cli::Options& options, Options& o)
     options.add("--lid", o.lid, "Upper wall of the packing: keep (holds the grains, water passes), or remove (a compressed sample springs up)").one_of({"keep", "remove"});
     options.quantity("--duration", o.plan.duration, Dimension::time, "Length of the run");
     options.quantity("--dem-step", o.plan.dem_step, Dimension::time, "Step of contact; 0: 0.3 of the critical one");
-    options.add("--engine", o.engine, "Flow solver: embedded or openfoam");
+    options.add("--engine", o.engine, "Flow solver: embedded; openfoam is not supported yet");
     options.flag("--explain", o.explain, "Print the plan and the errors to expect, and write nothing");
 }
 
@@ -79,6 +81,7 @@ void run(const Options& o, const coral::cli::Context& context)
         std::error_code failed;
         fs::create_directories(folder, failed);
         if (failed) throw Error(folder.string(), "cannot be made: " + failed.message(), "choose a folder that can be written");
+        if (fs::exists(folder / "results.h5")) spdlog::warn("{} is of the case that was here before; suffuse replaces it", (folder / "results.h5").string());
         copy_sample(sample, context, folder / "sample.h5");
         write_text_file(folder / "case.toml", suffusion::case_text(plan, sample, "sample.h5"));
         human += "case      " + (folder / "case.toml").string() + "; run it with: suffuse " + folder.string() + "\n";

@@ -5,6 +5,7 @@
 
 #include <limits>
 
+#include "core/error.h"
 #include "core/text.h"
 #include "suffusion/run.h"
 
@@ -64,6 +65,7 @@ nlohmann::ordered_json json_summary(const coral::suffusion::RunSummary& s)
 
 void run(const Options& o, const coral::cli::Context& context)
 {
+    if (!(o.until > 0)) throw coral::UsageError("--until", "is " + coral::to_text(o.until) + " s", "give a time above zero");
     coral::cli::catch_stop_signals();
     coral::suffusion::RunOptions options;
     options.until = o.until;

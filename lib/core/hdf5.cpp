@@ -14,6 +14,9 @@
 namespace coral {
 namespace {
 
+/// Every file is closed by its owner. What HDF5 closes at exit are files that could not be written, on a full disk for instance: it crashes over them.
+[[maybe_unused]] const bool closes_nothing_at_exit = H5dont_atexit() >= 0;
+
 /// HDF5 fills in what was never written, so that a damaged size may ask for any amount of memory. Deflate packs 1032 : 1 at best.
 constexpr double most_unpacked_per_stored = 1100;
 constexpr double always_allowed_bytes = 64 << 20;

@@ -388,6 +388,7 @@ Sample read_sample(const std::filesystem::path& path, SampleDetail detail)
     const H5File file = H5File::open(path);
     const Reader in(file);
     file.require_format(file_format::sample);
+    if (!file.has_attribute("/", "content") && !file.exists("/particles")) in.fail("/", "is not a sample, which pack-sample and swap-shapes write");
     const char* name = file.has_attribute("/", "content") ? "content" : "format";  // the first files had it as a text in `format`
     if (!file.has_attribute("/", name) || file.string_attribute("/", name) != content) in.fail("/", "is not a sample (attribute content is not '" + std::string(content) + "')");
     Sample sample;

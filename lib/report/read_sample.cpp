@@ -77,6 +77,12 @@ void read_sample(const std::filesystem::path& path, CaseData& data)
         file.require_format(file_format::sample);
         std::vector<Body> bodies = bodies_of(file);
         const auto fine = static_cast<std::size_t>(std::ranges::count(bodies, "fine", &Body::role));
+        const auto of_case = static_cast<std::size_t>(std::ranges::count(data.bodies, "fine", &Body::role)), run = data.migration.id.size();
+        if (run > 0 && fine + of_case != run) {
+            data.notes.push_back("The sample that lies beside the results is another one than the run's (" + std::to_string(fine + of_case) + " fines, not " + std::to_string(run) +
+                                 ") and was left out; run suffuse again.");
+            return;
+        }
         data.setup.push_back({"Grains of the sample", std::to_string(bodies.size() - fine) + " coarse, " + std::to_string(fine) + " fine"});
         data.bodies.insert(data.bodies.begin(), std::make_move_iterator(bodies.begin()), std::make_move_iterator(bodies.end()));
         data.sample = path;

@@ -181,6 +181,8 @@ Plan make_plan(const pack::Sample& sample, const PlanOptions& options)
     if (smallest_coarse <= 0) throw Error("sample", "has no coarse grains", "pack a population with role = \"coarse\"");
     if (!(options.velocity > 0)) throw UsageError("--velocity", "is " + to_text(options.velocity) + " m/s: the inlet is closed", "give a speed above zero");
     if (!(options.duration > 0)) throw UsageError("--duration", "is " + to_text(options.duration) + " s", "give a time above zero");
+    if (!(std::abs(options.angle) <= M_PI))
+        throw UsageError("--angle", "is " + to_text(std::round(options.angle * 180 / M_PI)) + " deg (a bare number is in radians)", "write it with its unit, such as 45deg, from -180deg to 180deg");
     if (!(options.dem_step >= 0)) throw UsageError("--dem-step", "is " + to_text(options.dem_step) + " s", "give a time above zero, or 0 for 0.3 of the critical step");
     if (plan.options.hole == 0) plan.options.hole = 0.4 * smallest_coarse;
     if (plan.options.cell == 0) plan.options.cell = smallest_coarse / 30;

@@ -51,6 +51,17 @@ TEST_F(Files, keep_the_old_content_when_a_new_output_is_abandoned)
 
 TEST_F(Files, need_a_folder_that_exists) { EXPECT_THROW(OutputFile(folder / "missing" / "out.csv"), Error); }
 
+TEST_F(Files, replace_what_a_link_names_and_no_device)
+{
+    write_text_file(folder / "real.csv", "old");
+    fs::create_symlink("real.csv", folder / "link.csv");
+    write_text_file(folder / "link.csv", "new");
+    EXPECT_TRUE(fs::is_symlink(folder / "link.csv"));
+    EXPECT_EQ(read_text_file(folder / "real.csv"), "new");
+    fs::create_symlink("/dev/null", folder / "device.csv");
+    EXPECT_THROW(OutputFile(folder / "device.csv"), Error);
+}
+
 TEST_F(Files, tables_round_trip_numbers_and_texts)
 {
     Table table{{"id", "value", "name"}, {}};

@@ -103,6 +103,19 @@ TEST(ReadCases, tells_folders_of_one_name_apart)
     EXPECT_EQ(cases[2].name, "fast/case (2)");
 }
 
+TEST(CaseData, a_sample_of_another_run_is_left_out_with_a_note)
+{
+    const ScratchFolder scratch;
+    write_example_case(scratch.path() / "ls");
+    write_example_case(scratch.path() / "other", {.fines = 60});
+    std::filesystem::copy_file(scratch.path() / "other/sample.h5", scratch.path() / "ls/sample.h5", std::filesystem::copy_options::overwrite_existing);
+    const CaseData data = read_case(scratch.path() / "ls");
+    EXPECT_TRUE(data.criteria.empty());
+    EXPECT_TRUE(data.sample.empty());
+    ASSERT_EQ(data.notes.size(), 1u);
+    EXPECT_NE(data.notes[0].find("is another one than the run's (60 fines, not 120)"), std::string::npos) << data.notes[0];
+}
+
 TEST(Summary, counts_fines_and_takes_medians_early_and_late)
 {
     const ScratchFolder scratch;

@@ -1,8 +1,11 @@
 // make-case on a small sample made in memory; the case it writes runs.
 #include <gtest/gtest.h>
+#include <sys/mount.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
+#include <cstring>
 #include <numbers>
 
 #include "core/hdf5.h"
@@ -64,6 +67,30 @@ TEST(MakeCase, takes_the_contact_step_as_asked_and_refuses_one_above_critical)
     EXPECT_EQ(refused.exit_code, 2);
     EXPECT_NE(refused.err.find("--dem-step"), std::string::npos) << refused.err;
     EXPECT_FALSE(std::filesystem::exists(folder.path() / "coarse"));
+}
+
+TEST(MakeCase, refuses_an_angle_without_its_unit)
+{
+    const ScratchFolder folder;
+    pack::write_sample(small_sample(true), folder.path() / "sample.h5");
+    const ProgramResult refused = run_program("make-case sample.h5 --explain --cell 1mm --angle 45", folder.path());
+    EXPECT_EQ(refused.exit_code, 2);
+    EXPECT_NE(refused.err.find("--angle: is 2578 deg (a bare number is in radians)"), std::string::npos) << refused.err;
+}
+
+TEST(MakeCase, ends_with_one_error_on_a_full_disk)
+{
+    const ScratchFolder folder;
+    pack::write_sample(small_sample(true), folder.path() / "sample.h5");
+    const std::filesystem::path small = folder.path() / "small";
+    std::filesystem::create_directory(small);
+    if (::mount("tmpfs", small.c_str(), "tmpfs", 0, "size=8k") != 0) GTEST_SKIP() << "cannot mount a small tmpfs: " << std::strerror(errno);
+    const ProgramResult full = run_program("make-case sample.h5 -o small/case --cell 1mm", folder.path());
+    EXPECT_EQ(full.exit_code, 1) << full.err;
+    EXPECT_NE(full.err.find("check the space left on the disk"), std::string::npos) << full.err;
+    EXPECT_EQ(std::ranges::count(full.err, '\n'), 1) << full.err;
+    EXPECT_FALSE(std::filesystem::exists(small / "case/sample.h5"));
+    ::umount(small.c_str());
 }
 
 TEST(MakeCase, plans_the_contact_steps_that_the_run_takes_for_angular_fines_too)

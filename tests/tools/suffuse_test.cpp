@@ -185,6 +185,9 @@ TEST(Suffuse, resumed_run_goes_on_with_the_contact_step_of_the_changed_case)
     const auto dem_steps = [&] { return H5File::open(folder.path() / "results.h5").read_doubles("/performance/dem_steps")[0]; };
     write_text(folder.path() / "case.toml", erosion_scene("4ms", "dem_step = \"2us\"\n"));
     ASSERT_EQ(run_program("suffuse . --quiet --until 2ms", folder.path()).exit_code, 0);
+    const std::string kept = read_text_file(folder.path() / "results.h5");
+    EXPECT_EQ(run_program("suffuse . --quiet --until -5s", folder.path()).exit_code, 2);
+    EXPECT_EQ(read_text_file(folder.path() / "results.h5"), kept) << "a stop before the start replaces nothing";
     const double first = dem_steps();
     EXPECT_NEAR(first, 1000, 60) << "each flow step holds a whole number of them";
     write_text(folder.path() / "case.toml", erosion_scene("4ms", "dem_step = \"1us\"\n"));
