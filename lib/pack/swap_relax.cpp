@@ -224,7 +224,7 @@ Displacement displacement(std::vector<double> ways)
     if (ways.empty()) return d;
     std::sort(ways.begin(), ways.end());
     for (const double way : ways) d.mean += way / double(ways.size());
-    d.median = ways[ways.size() / 2];
+    d.median = 0.5 * (ways[(ways.size() - 1) / 2] + ways[ways.size() / 2]);
     d.largest = ways.back();
     d.grains = int(ways.size());
     return d;

@@ -105,7 +105,7 @@ MeshGrains grains_of_meshes(const Options& o, Source& source, Stages& stages)
         sorted.extraction.grains.push_back(std::move(read.extraction.grains[n]));
         sorted.surfaces.push_back(std::move(read.surfaces[n]));
     }
-    sorted.edge = median(edges);
+    sorted.edge = upper_median(edges);
     source.decision = fmt::format("{} meshes in {}", o.stack.size(), o.mesh_unit);
     stages.lap("read");
     return sorted;

@@ -92,6 +92,13 @@ double median(std::vector<double> values)
 {
     if (values.empty()) return 0;
     std::sort(values.begin(), values.end());
+    return 0.5 * (values[(values.size() - 1) / 2] + values[values.size() / 2]);
+}
+
+double upper_median(std::vector<double> values)
+{
+    if (values.empty()) return 0;
+    std::sort(values.begin(), values.end());
     return values[values.size() / 2];
 }
 
@@ -99,7 +106,7 @@ double typical_edge(const Eigen::Vector3d& voxel_size, const std::vector<morph::
 {
     std::vector<double> scales;
     for (const morph::Grain& grain : grains) scales.push_back(grain.scale);
-    return voxel_size.maxCoeff() * (scales.empty() ? 1.0 : median(scales));
+    return voxel_size.maxCoeff() * (scales.empty() ? 1.0 : upper_median(scales));
 }
 
 double choose_spacing(const Options& o, double edge)
@@ -120,7 +127,7 @@ double spacing_within(double tolerance, double edge, const Shapes& shapes, sdf::
     for (const morph::Grain& grain : shapes.grains) diameters.push_back(grain.shape.equivalent_diameter);
     Search search(shapes, edge, options);
     // Below eight nodes across the grain the shape is gone whatever its volume says.
-    int good = -1, bad = 1 + std::max(0, int(std::floor(4.0 * std::log2(median(diameters) / (8.0 * edge)))));
+    int good = -1, bad = 1 + std::max(0, int(std::floor(4.0 * std::log2(upper_median(diameters) / (8.0 * edge)))));
     const int limit = bad;
     while (bad - good > 1) {
         const int middle = (good + bad) / 2;

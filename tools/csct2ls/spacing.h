@@ -10,7 +10,8 @@
 
 namespace coral::csct2ls {
 
-double median(std::vector<double> values);  ///< the upper one of an even number; 0 when empty
+double median(std::vector<double> values);        ///< 0 when empty
+double upper_median(std::vector<double> values);  ///< one of the values: the upper one of the two in the middle; 0 when empty
 
 /// Median over the grains of their scaled voxel edge, the longest of the three [m].
 double typical_edge(const Eigen::Vector3d& voxel_size, const std::vector<morph::Grain>& grains);

@@ -30,7 +30,7 @@ void Report::lengths(const std::string& key, std::vector<double> values)
 {
     if (values.empty()) return;
     std::ranges::sort(values);
-    const double low = values.front(), middle = values[values.size() / 2], high = values.back();
+    const double low = values.front(), middle = 0.5 * (values[(values.size() - 1) / 2] + values[values.size() / 2]), high = values.back();
     add(key, {low, middle, high}, fmt::format("{} to {}, median {}", metres(low), metres(high), metres(middle)));
 }
 

@@ -49,8 +49,9 @@ Report describe_table(const std::filesystem::path& file)
             lines.push_back(table.columns[c]);
             continue;
         }
-        ranges[table.columns[c]] = {values.front(), values[values.size() / 2], values.back()};
-        lines.push_back(fmt::format("{}: {:.6g} to {:.6g}, median {:.6g}", table.columns[c], values.front(), values.back(), values[values.size() / 2]));
+        const double middle = 0.5 * (values[(values.size() - 1) / 2] + values[values.size() / 2]);
+        ranges[table.columns[c]] = {values.front(), middle, values.back()};
+        lines.push_back(fmt::format("{}: {:.6g} to {:.6g}, median {:.6g}", table.columns[c], values.front(), values.back(), middle));
     }
     report.list("columns", ranges, lines);
     return report;
