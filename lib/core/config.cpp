@@ -14,6 +14,7 @@ namespace coral {
 struct Config::Document {
     struct Problem {
         toml::source_position position;
+        std::string key;  ///< dotted; a key is reported once, by what was found first
         std::string text;
     };
 
@@ -50,9 +51,13 @@ struct ConfigTable::Node {
     }
     void problem(std::string_view key, std::string_view what, std::string_view how_to_fix)
     {
-        std::string text = "key '" + path + std::string(key) + "' " + std::string(what);
+        std::string full = path + std::string(key);
+        const toml::source_position place = position(key);
+        // A value that could not be read stands as zero, so that later checks of it would only say so again.
+        if (std::ranges::any_of(document->problems, [&](const Config::Document::Problem& p) { return p.key == full && p.position == place; })) return;
+        std::string text = "key '" + full + "' " + std::string(what);
         if (!how_to_fix.empty()) text.append("; ").append(how_to_fix);
-        document->problems.push_back({position(key), std::move(text)});
+        document->problems.push_back({place, std::move(full), std::move(text)});
     }
     void missing(std::string_view key) { problem(key, "is missing", "add it"); }
 };
@@ -330,7 +335,9 @@ Config Config::from_text(const std::string& text, const std::string& name)
 Config Config::from_file(const std::filesystem::path& file)
 {
     if (!std::filesystem::is_regular_file(file)) throw UsageError(file.string(), "no such file", "give the path of a TOML file");
-    return from_text(read_text_file(file), file.string());
+    const std::string text = read_text_file(file);
+    if (text.find('\0') != std::string::npos) throw UsageError(file.string(), "is no text", "give the path of a TOML file");
+    return from_text(text, file.string());
 }
 
 void Config::finish() const
@@ -346,9 +353,10 @@ void Config::finish() const
         const std::vector<std::string> candidates(known[node->content].begin(), known[node->content].end());
         for (const auto& [name, value] : *node->content) {
             if (known[node->content].contains(std::string(name.str()))) continue;
-            std::string text = "unknown key '" + node->path + std::string(name.str()) + "'";
+            const std::string full = node->path + std::string(name.str());
+            std::string text = "unknown key '" + full + "'";
             if (const std::string hint = did_you_mean(name.str(), candidates); !hint.empty()) text += "; " + hint;
-            problems.push_back({name.source().begin, std::move(text)});
+            problems.push_back({name.source().begin, full, std::move(text)});
         }
     }
     if (problems.empty()) return;

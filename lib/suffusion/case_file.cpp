@@ -54,8 +54,12 @@ double not_negative(const ConfigTable& table, const char* key, Dimension dimensi
 double time_or_word(const ConfigTable& table, const char* key, const string& word, double fallback)
 {
     if (!table.has(key)) return fallback;
-    if (table.is_string(key) && table.string(key) == word) return 0;
-    return positive(table, key, Dimension::time);
+    if (!table.is_string(key)) return positive(table, key, Dimension::time);
+    const string text = table.string(key);
+    if (text == word) return 0;
+    if (text.find_first_of("0123456789") != string::npos) return positive(table, key, Dimension::time);
+    table.error(key, "= '" + text + "' is no time", "give one such as \"1ms\", or \"" + word + "\"");
+    return fallback;
 }
 
 DomainSpec read_domain(const ConfigTable& table, bool with_fluid)

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "core/error.h"
 
 namespace coral {
@@ -40,6 +42,17 @@ TEST(Config, reports_every_problem_at_once_sorted_by_line)
     EXPECT_NE(text.find("case.toml:5:1: key 'flow.scheme' = 'autom' is not one of: auto, resolved; did you mean 'auto'?"), std::string::npos) << text;
     EXPECT_NE(text.find("key 'flow.cell' is missing"), std::string::npos) << text;
     EXPECT_LT(text.find("friction"), text.find("half_widht"));
+}
+
+TEST(Config, says_of_each_key_once_what_is_wrong_with_it)
+{
+    const Config config = Config::from_text("[[body]]\nsize = \"big\"\n[[body]]\nsize = \"huge\"\n", "case.toml");
+    for (const ConfigTable& body : config.root().tables("body"))
+        if (!(body.quantity("size", Dimension::length) > 0)) body.error("size", "is not above zero");
+    const std::string text = problems_of(config);
+    EXPECT_EQ(std::ranges::count(text, '\n'), 1) << text;
+    EXPECT_EQ(text.find("not above zero"), std::string::npos) << text;
+    EXPECT_NE(text.find("case.toml:4:1: key 'body.size' is wrong"), std::string::npos) << text;
 }
 
 TEST(Config, gives_the_place_of_a_syntax_error)

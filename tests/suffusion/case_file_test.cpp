@@ -139,6 +139,13 @@ TEST(CaseFile, knows_how_far_each_flow_scheme_may_step)
     EXPECT_NE(error_of(replaced(whole, "cfl = 0.5", "flow_scheme = \"runge-kuta\"")).find("adams-bashforth"), std::string::npos);
 }
 
+TEST(CaseFile, names_the_word_that_may_stand_for_a_time)
+{
+    const std::string error = error_of(replaced(whole, "dem_step = \"2e-6s\"", "dem_step = \"automatic\""));
+    EXPECT_NE(error.find("'automatic' is no time; give one such as \"1ms\", or \"auto\""), std::string::npos) << error;
+    EXPECT_EQ(error.find('\n'), std::string::npos) << error;
+}
+
 TEST(CaseFile, names_the_inlet_that_is_closed)
 {
     for (const char* velocity : {"[0, 0, 0]", "[0, 0, 0.1]", "[0.1, 0, 0]"}) {

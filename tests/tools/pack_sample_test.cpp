@@ -139,6 +139,15 @@ TEST(PackSample, ends_with_1_on_a_damaged_grain_file)
     EXPECT_NE(result.err.find("grains.vdb"), std::string::npos) << result.err;
 }
 
+TEST(PackSample, ends_with_2_on_a_specification_that_is_no_text)
+{
+    const ScratchFolder folder;
+    write_text(folder.path() / "sample.h5", std::string("\x89HDF\0\0", 6));
+    const ProgramResult result = run_program("pack-sample sample.h5 -o out.h5", folder.path());
+    EXPECT_EQ(result.exit_code, 2);
+    EXPECT_NE(result.err.find("sample.h5: is no text"), std::string::npos) << result.err;
+}
+
 TEST(PackSample, ends_with_2_when_the_specification_or_the_output_folder_is_missing)
 {
     const ScratchFolder folder;
