@@ -207,7 +207,7 @@ int run_tool(int argc, char** argv, const std::string& name, const std::string& 
     try {
         Options options(app);
         declare(options);
-        if (seed) app.add_option("--seed", *seed, "Seed of the random numbers");
+        if (seed) app.add_option("--seed", *seed, "Seed of the random numbers")->check(CLI::NonNegativeNumber);
         app.add_option("--threads", common.threads, "Threads; 0 takes all cores")->check(CLI::Range(0, 1024));
         app.add_flag("--quiet", common.quiet, "No progress and no summary");
         app.add_flag("--json", common.json, "Summary as one JSON object on stdout");

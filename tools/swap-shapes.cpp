@@ -121,6 +121,8 @@ void run(Options& o, const cli::Context& context, std::uint64_t seed)
     if (!std::filesystem::is_directory(o.output.has_parent_path() ? o.output.parent_path() : "."))
         throw UsageError(o.output.string(), "its folder does not exist", "make the folder first");
     if (!o.figure.empty()) pack::check_png(o.figure);
+    if (!o.swap.library.empty() && o.coarse == "keep" && o.fine == "keep")
+        throw UsageError("--library", "is given, but all grains keep their shapes", "say with --coarse or --fine what they become");
     o.swap.coarse = kind_of(o.coarse);
     o.swap.fine = kind_of(o.fine);
     o.swap.keep_mass = o.keep == "mass";

@@ -74,6 +74,9 @@ TEST(SwapShapesTool, ends_with_1_on_damaged_input_and_with_2_on_a_wrong_command_
     EXPECT_EQ(run_program("swap-shapes none.h5 --coarse sphere -o out.h5", folder.path()).exit_code, 2);
     EXPECT_EQ(run_program("swap-shapes sample.h5 --coarse cube -o out.h5", folder.path()).exit_code, 2);
     EXPECT_EQ(run_program("swap-shapes sample.h5 --coarse sphere -o none/out.h5", folder.path()).exit_code, 2);
+    write_text(folder.path() / "shapes.sh.h5", "of no use here");
+    EXPECT_EQ(run_program("swap-shapes sample.h5 --library shapes.sh.h5 -o out.h5", folder.path()).exit_code, 2);
+    EXPECT_EQ(run_program("swap-shapes sample.h5 --coarse sphere --seed -1 -o out.h5", folder.path()).exit_code, 2);
     EXPECT_EQ(run_program("swap-shapes sample.h5 --coarse sh --library none.sh.h5 -o out.h5", folder.path()).exit_code, 2);
     EXPECT_FALSE(std::filesystem::exists(folder.path() / "out.h5"));
 }
