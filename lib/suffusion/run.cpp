@@ -49,6 +49,13 @@ private:
     double interval_, end_;
 };
 
+/// A plate that reaches into the cells at an outlet exchanges momentum with what leaves: the balance of the run does not close there.
+bool plate_at_outlet(const Case& c)
+{
+    const WallSpec* plate = c.plate();
+    return plate && c.domain && c.boundary[4].kind == BoundaryKind::outlet && plate->z - plate->thickness < c.domain->origin.z() + c.domain->cell;
+}
+
 class Run {
 public:
     Run(const fs::path& path, const RunOptions& options);
@@ -94,6 +101,8 @@ Run::Run(const fs::path& path, const RunOptions& options)
     History history = simulation_.scene().history;
     history.push_back(options_.record);
     observer_.results().history = to_json(history);
+    if (plate_at_outlet(simulation_.scene().description))
+        options_.message("the plate lies within a cell of the outlet: the balance of momentum will not close; begin the domain lower");
 }
 
 void Run::resume(const Checkpoint& checkpoint)
