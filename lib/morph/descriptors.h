@@ -24,7 +24,7 @@ struct Descriptors {
     double elongation = 0;               ///< b/a of the least oriented box a >= b >= c of the hull [Zingg 1935]
     double flatness = 0;                 ///< c/b
     double sphericity = 0;               ///< (36 pi V^2)^(1/3) / A [Wadell 1932]
-    double convexity = 0;                ///< V / volume of the convex hull
+    double convexity = 0;                ///< volume over that of the convex hull, of the apparent shape
     double roundness = 0;                ///< see measure()
 };
 
