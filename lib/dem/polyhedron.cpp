@@ -3,12 +3,14 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <map>
 #include <numeric>
 
 #include "core/error.h"
 #include "dem/detail/hull.h"
+#include "dem/detail/lanes.h"
 
 namespace coral::dem {
 
@@ -23,24 +25,32 @@ constexpr double flat = 1e-6;  ///< of the size: what lies this near to a plane 
 
 std::size_t padded(std::size_t n) { return (n + lanes - 1) / lanes * lanes; }
 
-/// Extreme of value(i) over i < count (a whole number of lanes), the first of equals within a lane. Lanes compare side by side, so that
-/// the loop vectorises without leave to reorder floating-point sums.
-template <class Value>
-std::pair<double, int> least(std::size_t count, const Value& value)
+detail::Lanes load(const double* values)
 {
-    double best[lanes], index[lanes];
-    for (std::size_t l = 0; l < lanes; ++l) best[l] = never, index[l] = 0.0;
+    detail::Lanes four;
+    std::memcpy(&four, values, sizeof four);
+    return four;
+}
+
+/// Least of values(i), those of i to i + 3, over i < count (a whole number of lanes), the first of equals within a lane.
+template <class Values>
+std::pair<double, int> least(std::size_t count, const Values& values)
+{
+    constexpr std::size_t groups = lanes / detail::lane_count;
+    detail::Lanes best[groups], index[groups];
+    for (std::size_t g = 0; g < groups; ++g) best[g] = detail::all(never), index[g] = detail::all(0.0);
     for (std::size_t i = 0; i < count; i += lanes)
-        for (std::size_t l = 0; l < lanes; ++l) {
-            const double v = value(i + l);
-            const bool better = v < best[l];
-            best[l] = better ? v : best[l];
-            index[l] = better ? double(i) : index[l];
+        for (std::size_t g = 0; g < groups; ++g) {
+            const detail::Lanes v = values(i + g * detail::lane_count);
+            const auto better = v < best[g];
+            best[g] = better ? v : best[g];
+            index[g] = better ? detail::all(double(i)) : index[g];
         }
     std::size_t winner = 0;
-    for (std::size_t l = 1; l < lanes; ++l)
-        if (best[l] < best[winner]) winner = l;
-    return {best[winner], int(index[winner]) + int(winner)};
+    const auto of = [](const detail::Lanes* l, std::size_t k) { return l[k / detail::lane_count][k % detail::lane_count]; };
+    for (std::size_t k = 1; k < lanes; ++k)
+        if (of(best, k) < of(best, winner)) winner = k;
+    return {of(best, winner), int(of(index, winner)) + int(winner)};
 }
 
 /// Group of each triangle: neighbours whose planes are one. A sliver has no plane of its own and goes with one neighbour, on the longest edge
@@ -216,23 +226,21 @@ void Polyhedron::take_edges()
 
 Polyhedron::Extreme Polyhedron::highest_plane(const Vector3d& p) const
 {
-    const double x = p.x(), y = p.y(), z = p.z();
+    const detail::Lanes x = detail::all(p.x()), y = detail::all(p.y()), z = detail::all(p.z());
     const double *nx = plane_x_.data(), *ny = plane_y_.data(), *nz = plane_z_.data(), *d = plane_d_.data();
-    const auto [below, index] = least(plane_d_.size(), [=](std::size_t i) { return d[i] - (nx[i] * x + ny[i] * y + nz[i] * z); });
+    const auto [below, index] = least(plane_d_.size(), [=](std::size_t i) { return load(d + i) - (load(nx + i) * x + load(ny + i) * y + load(nz + i) * z); });
     return {-below, index};
 }
 
 Polyhedron::Extreme Polyhedron::nearest_edge(const Vector3d& p) const
 {
-    const double x = p.x(), y = p.y(), z = p.z();
+    const detail::Lanes x = detail::all(p.x()), y = detail::all(p.y()), z = detail::all(p.z()), zero = detail::all(0.0);
     const double *ax = edge_start_[0].data(), *ay = edge_start_[1].data(), *az = edge_start_[2].data(), *ux = edge_unit_[0].data(),
                  *uy = edge_unit_[1].data(), *uz = edge_unit_[2].data(), *length = edge_length_.data();
     const auto [squared, index] = least(edge_length_.size(), [=](std::size_t i) {
-        const double rx = x - ax[i], ry = y - ay[i], rz = z - az[i];
-        double t = rx * ux[i] + ry * uy[i] + rz * uz[i];
-        t = t > 0.0 ? t : 0.0;
-        t = t < length[i] ? t : length[i];
-        const double sx = rx - t * ux[i], sy = ry - t * uy[i], sz = rz - t * uz[i];
+        const detail::Lanes rx = x - load(ax + i), ry = y - load(ay + i), rz = z - load(az + i), vx = load(ux + i), vy = load(uy + i), vz = load(uz + i);
+        const detail::Lanes t = detail::min(detail::max(rx * vx + ry * vy + rz * vz, zero), load(length + i));
+        const detail::Lanes sx = rx - t * vx, sy = ry - t * vy, sz = rz - t * vz;
         return sx * sx + sy * sy + sz * sz;
     });
     return {squared, index};
