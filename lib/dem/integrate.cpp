@@ -11,15 +11,21 @@ namespace coral::dem {
 
 namespace {
 
+/// Unit length for a quaternion that has it but for rounding or a small turn.
+void renormalize(Quat& q)
+{
+    const double length2 = q.squaredNorm();
+    if (std::abs(length2 - 1.0) < 1e-4) q.coeffs() *= 1.5 - 0.5 * length2;  // one Newton step of 1/sqrt, no root and no division
+    else q.normalize();
+}
+
 /// Turn by a small angle, second order and of unit length: enough for spheres, whose orientation is for looking at only.
 void turn_sphere(Quat& q, const Vec3& turn)
 {
     const Vec3 h = 0.5 * turn;
     const Quat step(1.0, h.x(), h.y(), h.z());
     q = step * q;
-    const double length2 = q.squaredNorm();
-    if (std::abs(length2 - 1.0) < 1e-4) q.coeffs() *= 1.5 - 0.5 * length2;  // one Newton step of 1/sqrt, no root and no division
-    else q.normalize();
+    renormalize(q);
 }
 
 struct SineCosine {
@@ -31,8 +37,8 @@ SineCosine sine_and_cosine(double angle)
 {
     if (std::abs(angle) > 0.1) return {std::sin(angle), std::cos(angle)};
     const double z = angle * angle;
-    return {angle * (1.0 - z / 6.0 * (1.0 - z / 20.0 * (1.0 - z / 42.0 * (1.0 - z / 72.0)))),
-            1.0 - z / 2.0 * (1.0 - z / 12.0 * (1.0 - z / 30.0 * (1.0 - z / 56.0 * (1.0 - z / 90.0))))};
+    return {angle * (1.0 - z * (1.0 / 6.0) * (1.0 - z * (1.0 / 20.0) * (1.0 - z * (1.0 / 42.0) * (1.0 - z * (1.0 / 72.0))))),
+            1.0 - z * 0.5 * (1.0 - z * (1.0 / 12.0) * (1.0 - z * (1.0 / 30.0) * (1.0 - z * (1.0 / 56.0) * (1.0 - z * (1.0 / 90.0)))))};
 }
 
 /// Rotates the body-frame angular momentum about axis k by the flow of b_k^2/(2 I_k) over time t; `turn` gathers the rotation of the body.
@@ -54,17 +60,16 @@ void spin_about(double t, const Vec3& inverse_moment, Vec3& b, Quat& turn)
 }
 
 /// Free rotation over dt with constant world angular momentum: five exact rotations, symmetric, symplectic.
-Quat free_rotation(const Quat& principal_to_world, const Vec3& momentum, const Vec3& moments, double dt)
+/// \param b  angular momentum in principal axes, before and then after
+Quat free_rotation(Vec3& b, const Vec3& inverse_moments, double dt)
 {
-    const Vec3 inverse = moments.cwiseInverse();
-    Vec3 b = principal_to_world.conjugate() * momentum;
     Quat turn = Quat::Identity();
-    spin_about<0>(0.5 * dt, inverse, b, turn);
-    spin_about<1>(0.5 * dt, inverse, b, turn);
-    spin_about<2>(dt, inverse, b, turn);
-    spin_about<1>(0.5 * dt, inverse, b, turn);
-    spin_about<0>(0.5 * dt, inverse, b, turn);
-    return (principal_to_world * turn).normalized();
+    spin_about<0>(0.5 * dt, inverse_moments, b, turn);
+    spin_about<1>(0.5 * dt, inverse_moments, b, turn);
+    spin_about<2>(dt, inverse_moments, b, turn);
+    spin_about<1>(0.5 * dt, inverse_moments, b, turn);
+    spin_about<0>(0.5 * dt, inverse_moments, b, turn);
+    return turn;
 }
 
 }  // namespace
@@ -107,7 +112,7 @@ void World::Impl::check_step(double dt) const
                     "use " + to_text(automatic_step()) + " s (automatic) or a smaller stiffness");
 }
 
-// Kick of one body over dt. Returns the energy that its added mass takes up.
+// Kick of one body over dt; the spin of a body with nodes is left for the caller to renew. Returns the energy that its added mass takes up.
 inline double World::Impl::kick_body(std::size_t i, double dt, const Vec3& g_dt)
 {
     double taken = 0.0;
@@ -119,12 +124,8 @@ inline double World::Impl::kick_body(std::size_t i, double dt, const Vec3& g_dt)
         v[i] += (inverse_mass[i] * dt) * force[i] + g_dt;
     Vec3 impulse = dt * torque[i];
     if (any_external) impulse += dt * external_torque[i];
-    if (has_nodes[i]) {
-        momentum[i] += impulse;
-        update_spin(i);
-    } else {
-        w[i] += inverse_inertia[i] * impulse;
-    }
+    if (has_nodes[i]) momentum[i] += impulse;
+    else w[i] += inverse_inertia[i] * impulse;
     return taken;
 }
 
@@ -134,7 +135,10 @@ void World::Impl::kick(double dt)
     external_work -= parallel_sum(x.size(), body_grain, 0.0, [&](std::size_t first, std::size_t last) {
         double taken = 0.0;
         for (std::size_t i = first; i < last; ++i)
-            if (inverse_mass[i] > 0.0) taken += kick_body(i, dt, g_dt);
+            if (inverse_mass[i] > 0.0) {
+                taken += kick_body(i, dt, g_dt);
+                if (has_nodes[i]) update_spin(i);
+            }
         return taken;
     });
 }
@@ -188,9 +192,8 @@ World::Impl::Drift World::Impl::drift_bodies(std::size_t first, std::size_t last
         farthest2 = std::max(farthest2, way2);
         Vec3 turn = dt * w[i];
         if (has_nodes[i]) {
-            w_before[i] = w[i];
             turn_grid(i, dt);
-            turn = 0.5 * (turn + dt * w[i]);
+            turn = 0.5 * dt * (w_before[i] + w[i]);
             if (mixed) {
                 grid_drift[i] = std::sqrt(way2) + turn_between(q[i], q_reference[i]) * radius[i];
                 sum.farthest = std::max(sum.farthest, grid_drift[i]);
@@ -207,15 +210,22 @@ World::Impl::Drift World::Impl::drift_bodies(std::size_t first, std::size_t last
     return sum;
 }
 
+// Turns a body with nodes; its spin before (after the kick) and after go to w_before and w.
 void World::Impl::turn_grid(std::size_t i, double dt)
 {
     if (motion[i] == Motion::free) {
-        const Quat& frame = shapes[std::size_t(shape[i])]->principal_rotation();
-        const Quat turned = free_rotation(q[i] * frame, momentum[i], principal[i], dt);
-        q[i] = turned * frame.conjugate();
-        w[i] = turned * (turned.conjugate() * momentum[i]).cwiseQuotient(principal[i]);
+        const Quat& principal_axes = shapes[std::size_t(shape[i])]->principal_rotation();
+        const Quat before = q[i] * principal_axes;
+        const Vec3 inverse = principal[i].cwiseInverse();
+        Vec3 b = before.conjugate() * momentum[i];
+        w_before[i] = before * b.cwiseProduct(inverse);
+        Quat after = before * free_rotation(b, inverse, dt);
+        renormalize(after);
+        q[i] = after * principal_axes.conjugate();
+        w[i] = after * b.cwiseProduct(inverse);
         return;
     }
+    w_before[i] = w[i];
     const double angle = w[i].norm() * dt;
     if (angle > 0.0) q[i] = (Quat(Eigen::AngleAxisd(angle, w[i].normalized())) * q[i]).normalized();
 }
