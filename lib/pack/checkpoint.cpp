@@ -75,6 +75,9 @@ void write_state(H5File& h5, const PackState& state)
     h5.set_attribute("/", "start", state.start);
     h5.set_attribute("/", "own_friction", std::int64_t(state.own_friction));
     h5.set_attribute("/", "lid_touches", std::int64_t(state.lid_touches));
+    std::vector<double> gains;
+    for (const ServoGain& gain : state.gains) gains.insert(gains.end(), {gain.share, gain.missing});
+    h5.write("/servo", std::span<const double>(gains), {gains.size()});
     const PackReport& r = state.report;
     const std::vector<std::int64_t> counts{r.layers, r.unsettled_layers, r.compressed, r.steps};
     std::vector<double> values;
@@ -92,8 +95,11 @@ PackState read_state(const H5File& h5, const Error& damaged)
     state.lid_touches = h5.integer_attribute("/", "lid_touches") != 0;
     const auto counts = h5.read_integers("/report/counts");
     const auto values = h5.read_doubles("/report/times");
-    if (phase < 0 || phase > 2 || batch < 0 || batch > 1'000'000'000 || !std::isfinite(state.start) || counts.size() != 4 || values.size() != std::size(times) || counts[3] < 0)
+    const auto gains = h5.read_doubles("/servo");
+    if (phase < 0 || phase > 2 || batch < 0 || batch > 1'000'000'000 || !std::isfinite(state.start) || counts.size() != 4 || values.size() != std::size(times) || counts[3] < 0 ||
+        gains.size() != 2 * state.gains.size())
         throw damaged;
+    for (std::size_t axis = 0; axis < state.gains.size(); ++axis) state.gains[axis] = {gains[2 * axis], gains[2 * axis + 1]};
     state.phase = Phase(phase);
     state.batch = int(batch);
     state.report.layers = int(counts[0]);

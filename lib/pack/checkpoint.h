@@ -2,6 +2,7 @@
 /// \file pack/checkpoint.h
 /// State of a packing between two windows of steps, and the file that keeps it. A packing that goes on from it ends with the same bytes
 /// as one that was never stopped. The file is replaced whole, so one that can be read is complete.
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <map>
@@ -15,6 +16,11 @@ namespace coral::pack {
 
 enum class Phase { pouring, compression, relaxation };
 
+/// How fast the servo of one pair of walls may be, and what its pressure lacked when it was last looked at [Pa].
+struct ServoGain {
+    double share = 1, missing = 0;
+};
+
 /// What a packing remembers besides its world.
 struct PackState {
     Phase phase = Phase::pouring;
@@ -23,6 +29,7 @@ struct PackState {
     double start = 0;           ///< of the batch or phase, in the time of its world [s]
     bool own_friction = false;  ///< compression: walls still close in, with the friction of the material by now
     bool lid_touches = false;   ///< compression: the side walls have begun to move
+    std::array<ServoGain, 3> gains;  ///< compression, by axis
     PackReport report;          ///< so far; wall times are those of all parts
 };
 

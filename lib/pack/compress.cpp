@@ -88,14 +88,14 @@ void set_frictions(dem::World& world, const Spec& spec, double friction)
 
 /// Sets the speeds of all pairs for the next few steps. Returns the worst relative error of a pressure; `mean` is their mean.
 double serve(dem::World& world, const Box& box, const Spec& spec, const std::array<int, 6>& contacts, double stiffness, double mass,
-             bool& lid_touches, double& mean)
+             PackState& state, double& mean)
 {
     const Compression& rule = spec.compression;
     const Eigen::Vector3d size = box.upper(world) - box.lower(world);
     const bool both = rule.walls != MovingWalls::top;
     double worst = 0, pairs = 0;
     mean = 0;
-    lid_touches = lid_touches || box.pressure(world, 5) > lid_first * rule.pressure;
+    state.lid_touches = state.lid_touches || box.pressure(world, 5) > lid_first * rule.pressure;
     for (int axis = 0; axis < 3; ++axis) {
         if (!moves(box, rule, axis)) continue;
         // the top alone pushes against a bottom that also carries the weight
@@ -104,8 +104,9 @@ double serve(dem::World& world, const Box& box, const Spec& spec, const std::arr
         worst = std::max(worst, std::abs(missing) / rule.pressure);
         mean += p, pairs += 1;
         const int touching = std::min(contacts[std::size_t(2 * axis)], contacts[std::size_t(2 * axis + 1)]);
-        const double speed = servo_speed(missing, box.area(world, axis), size[axis], touching, stiffness, mass, rule.max_velocity);
-        set_pair_speed(world, box, axis, axis < 2 && !lid_touches ? 0.0 : speed, both);
+        const double share = servo_share(state.gains[std::size_t(axis)], missing, rule.tolerance * rule.pressure);
+        const double speed = share * servo_speed(missing, box.area(world, axis), size[axis], touching, stiffness, mass, rule.max_velocity);
+        set_pair_speed(world, box, axis, axis < 2 && !state.lid_touches ? 0.0 : speed, both);
     }
     mean /= pairs;
     return worst;
@@ -129,7 +130,7 @@ bool to_pressure(dem::World& world, const Box& box, const Spec& spec, Keeper& ke
         window.start(world);
         for (int check = 0; check < checks_per_window; ++check) {
             double now = 0;
-            worst = std::max(worst, serve(world, box, spec, contacts, kn, mass, state.lid_touches, now));
+            worst = std::max(worst, serve(world, box, spec, contacts, kn, mass, state, now));
             mean += now / checks_per_window;
             step_some(world, dt, rule.drag);
         }
@@ -195,6 +196,15 @@ double servo_speed(double missing, double area, double gap, int wall_contacts, d
     const double layers = std::max(gap / std::sqrt(area / contacts), 1.0);
     const double k = contacts * stiffness / layers;
     return std::clamp(missing * area / (2 * std::sqrt(k * mass)), -limit, limit);
+}
+
+double servo_share(ServoGain& gain, double missing, double allowed)
+{
+    constexpr double least = 1e-3, return_rate = 1.02;  // a share that was too small is forgotten within some hundred looks
+    const bool swung = missing * gain.missing < 0 && std::min(std::abs(missing), std::abs(gain.missing)) > allowed;
+    gain.share = swung ? std::max(0.5 * gain.share, least) : std::min(return_rate * gain.share, 1.0);
+    gain.missing = missing;
+    return gain.share;
 }
 
 void set_pair_speed(dem::World& world, const Box& box, int axis, double speed, bool both)

@@ -178,7 +178,8 @@ public:
             const double wanted = both ? 0.5 * (pressure_[low] + pressure_[high]) : pressure_[high];
             const double now = both ? 0.5 * (box_.pressure(world, int(low)) + box_.pressure(world, int(high))) : box_.pressure(world, int(high));
             worst = std::max(worst, std::abs(wanted - now) / std::max(wanted, 0.1 * mean_));
-            const double speed = servo_speed(wanted - now, box_.area(world, axis), size[axis], std::min(contacts[low], contacts[high]), stiffness_, mass_, fastest_wall);
+            const double share = servo_share(gains_[std::size_t(axis)], wanted - now, pressure_tolerance * std::max(wanted, 0.1 * mean_));
+            const double speed = share * servo_speed(wanted - now, box_.area(world, axis), size[axis], std::min(contacts[low], contacts[high]), stiffness_, mass_, fastest_wall);
             set_pair_speed(world, box_, axis, speed, both);
         }
         return worst;
@@ -187,6 +188,7 @@ public:
 private:
     Box box_;
     std::array<double, 6> pressure_{};
+    std::array<ServoGain, 3> gains_;
     double mass_ = 0, stiffness_ = 0, mean_ = 0;
 };
 

@@ -9,6 +9,7 @@
 #include "core/output_file.h"
 #include "core/parallel.h"
 #include "core/progress.h"
+#include "pack/detail/phases.h"
 #include "pack/populations.h"
 #include "pack/sample_world.h"
 #include "pack/scratch.h"
@@ -16,6 +17,8 @@
 #include "sdf/vdb_io.h"
 
 using namespace coral::pack;
+using coral::pack::detail::servo_share;
+using coral::pack::detail::servo_speed;
 
 namespace {
 
@@ -71,6 +74,24 @@ coral::sdf::GrainLevelSet hollow_capsule(int id, double r, double half_length, d
 }
 
 }  // namespace
+
+/// A column whose pressure answers the walls many times as strongly as contacts of spheres would.
+TEST(Servo, comes_to_rest_on_sides_much_stiffer_than_it_thinks)
+{
+    constexpr double area = 1e-4, gap = 5e-3, stiffness = 2e4, mass = 4e-4, between_looks = 1.5e-4, wanted = 5e3;
+    for (const double stiffer : {0.5, 1.0, 4.0, 30.0, 300.0}) {
+        ServoGain gain;
+        double pressure = 0, worst = 0;
+        for (int look = 0; look < 3000; ++look) {
+            const double missing = wanted - pressure;
+            if (look >= 2500) worst = std::max(worst, std::abs(missing));
+            const double speed = servo_share(gain, missing, 0.02 * wanted) * servo_speed(missing, area, gap, 4, stiffness, mass, 1.0);
+            const double layers = gap / std::sqrt(area / 4);
+            pressure = std::max(0.0, pressure + 2 * speed * between_looks * stiffer * 4 * stiffness / std::max(layers, 1.0) / area);
+        }
+        EXPECT_LT(worst, 0.04 * wanted) << stiffer;
+    }
+}
 
 TEST(Populations, meet_a_mass_fraction_to_half_a_grain)
 {

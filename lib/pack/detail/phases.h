@@ -53,6 +53,9 @@ private:
 /// Servo of one pair of walls: closing speed of each wall [m/s] from the missing pressure [Pa].
 /// \param gap  between the walls [m]; \param wall_contacts  on one of them; \param stiffness  of a contact [N/m]; \param mass  of the sample [kg]
 double servo_speed(double missing, double area, double gap, int wall_contacts, double stiffness, double mass, double limit);
+/// Share of that speed to take. Flat sides of grains on a wall are stiffer than contacts of spheres, by a factor that is not known beforehand: the
+/// share is halved whenever the pressure has gone past its target by more than `allowed` [Pa] on both sides, and comes back by and by.
+double servo_share(ServoGain& gain, double missing, double allowed);
 /// Both walls of a pair close at this speed each, or the upper one alone at twice it [m/s].
 void set_pair_speed(dem::World& world, const Box& box, int axis, double speed, bool both);
 void stop_walls(dem::World& world, const Box& box);
