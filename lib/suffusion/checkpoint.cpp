@@ -18,6 +18,7 @@ void write_checkpoint(const std::filesystem::path& file, const Checkpoint& check
     h5.set_attribute("/", "frames", static_cast<std::int64_t>(checkpoint.frames));
     h5.set_attribute("/", "cells", static_cast<std::int64_t>(checkpoint.cells));
     h5.set_attribute("/", "bodies", static_cast<std::int64_t>(checkpoint.bodies));
+    h5.set_attribute("/", "history", checkpoint.history);
     h5.write("/simulation", std::span<const std::uint8_t>(checkpoint.simulation), {checkpoint.simulation.size()});
     h5.write("/observer", std::span<const std::uint8_t>(checkpoint.observer), {checkpoint.observer.size()});
     h5.commit();
@@ -35,6 +36,7 @@ Checkpoint read_checkpoint(const std::filesystem::path& file)
     checkpoint.frames = count("frames");
     checkpoint.cells = count("cells");
     checkpoint.bodies = count("bodies");
+    if (h5.has_attribute("/", "history")) checkpoint.history = h5.string_attribute("/", "history");
     checkpoint.simulation = h5.read_bytes("/simulation");
     checkpoint.observer = h5.read_bytes("/observer");
     return checkpoint;

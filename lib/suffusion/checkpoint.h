@@ -13,6 +13,7 @@ struct Checkpoint {
     std::size_t rows = 0;                   ///< rows of results.h5 that belong to it; later ones are dropped on resume
     std::size_t frames = 0;                 ///< frames written
     std::size_t cells = 0, bodies = 0;      ///< of the case, to tell another one
+    std::string history;                    ///< JSON, for whoever finds the file; a resumed run makes its own
     std::vector<std::uint8_t> simulation;   ///< Simulation::save
     std::vector<std::uint8_t> observer;     ///< Observer::save
 };

@@ -158,6 +158,7 @@ void Run::write_checkpoint_now(const std::vector<std::uint8_t>& state)
     checkpoint.frames = frames_.count();
     checkpoint.cells = simulation_.has_flow() ? simulation_.flow().grid().cell_count() : 0;
     checkpoint.bodies = simulation_.scene().bodies.size();
+    checkpoint.history = observer_.results().history;
     checkpoint.simulation = state;
     checkpoint.observer = observer_.save();
     write_checkpoint(checkpoint_file_, checkpoint);
@@ -224,6 +225,7 @@ void Run::stop_on_error()
     checkpoint.frames = last_frames_;
     checkpoint.cells = simulation_.has_flow() ? simulation_.flow().grid().cell_count() : 0;
     checkpoint.bodies = simulation_.scene().bodies.size();
+    checkpoint.history = observer_.results().history;
     checkpoint.simulation = last_good_;
     checkpoint.observer = last_observer_;
     write_checkpoint(checkpoint_file_, checkpoint);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <map>
+#include <set>
 
 #include "core/error.h"
 #include "core/parallel.h"
@@ -49,6 +50,19 @@ void add_sample(Scene& scene, pack::Sample& sample)
         if (const auto motion = c.motion_of_role.find(role); motion != c.motion_of_role.end()) scene.world.set_motion(body, motion_of(motion->second));
         const auto scheme = c.scheme_of_role.find(role);
         scene.bodies.push_back({scheme == c.scheme_of_role.end() ? Scheme::automatic : scheme->second});
+    }
+}
+
+/// Histories of the files of shapes, after that of the sample; a step that several files share is told once.
+void add_histories(Scene& scene)
+{
+    std::set<std::filesystem::path> files;
+    std::set<std::string> told;
+    for (const RecordEntry& step : scene.history) told.insert(to_json(History{step}));
+    for (const BodySpec& body : scene.description.bodies) {
+        if (body.file.empty() || !files.insert(body.file).second) continue;
+        for (const RecordEntry& step : shape_history(body, scene.description.folder))
+            if (told.insert(to_json(History{step})).second) scene.history.push_back(step);
     }
 }
 
@@ -209,6 +223,7 @@ std::unique_ptr<Scene> build_scene(Case description)
         if (name != "default") materials[name] = scene->world.add_material(material_of(name, spec));
     if (sample) add_sample(*scene, *sample);
     add_bodies(*scene, materials);
+    add_histories(*scene);
     add_walls(*scene, materials);
     describe_bodies(*scene);
     find_extent(*scene);

@@ -31,7 +31,7 @@ struct Scene {
     std::vector<BodyInfo> bodies;
     std::vector<std::unique_ptr<ApparentShape>> apparent_shapes;  ///< by shape of the world; null without voids
     Eigen::Vector3d lower = Eigen::Vector3d::Zero(), upper = Eigen::Vector3d::Zero();  ///< box around the grains at the start [m]
-    History history;  ///< of the sample; the caller adds its own entry
+    History history;  ///< of the sample and of the files of shapes; the caller adds its own entry
     bool has_plate() const { return description.plate() != nullptr; }
     /// Lengths of the domain between periodic faces, 0 along other axes [m].
     Eigen::Vector3d period() const;

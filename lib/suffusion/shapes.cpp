@@ -176,6 +176,13 @@ std::shared_ptr<const dem::Shape> make_shape(const BodySpec& body, const std::fi
     return dem::Shape::sphere(0.5);
 }
 
+History shape_history(const BodySpec& body, const std::filesystem::path& folder)
+{
+    if (body.shape == ShapeKind::level_set) return sdf::GrainReader(folder / body.file).history();
+    if (body.shape == ShapeKind::harmonics) return sh::read_shapes(folder / body.file).history;
+    return {};
+}
+
 Surface viewing_surface(const dem::Shape& shape)
 {
     Surface surface;

@@ -5,6 +5,7 @@
 #include <memory>
 #include <string>
 
+#include "core/record.h"
 #include "dem/shape.h"
 #include "fluid/drag.h"
 #include "suffusion/case_file.h"
@@ -18,6 +19,9 @@ std::string shape_key(const BodySpec& body);
 /// \param reach   largest distance outside that contact asks: the radius of the largest sphere, in metres of the unscaled shape
 /// \throws Error for damaged files; UsageError with the body's place when a file lacks the shape, or what it holds makes no body
 std::shared_ptr<const dem::Shape> make_shape(const BodySpec& body, const std::filesystem::path& folder, double reach);
+
+/// History of the file that a body's shape comes from; empty where there is none, or one of other makers.
+History shape_history(const BodySpec& body, const std::filesystem::path& folder);
 
 /// Polygons of a surface, vertices counter-clockwise seen from outside.
 struct Surface {

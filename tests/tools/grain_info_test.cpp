@@ -227,5 +227,20 @@ TEST_F(GrainInfo, refuses_damaged_files_and_those_of_a_newer_version)
     newer({"/series/time"}, "");
 }
 
+TEST_F(GrainInfo, follows_a_run_back_to_the_files_of_its_shapes)
+{
+    write_grains("grains.vdb");
+    write_shapes("stone.sh.h5", "0.1.0");
+    const std::string grain = "[[body]]\nshape = { type = \"level-set\", file = \"grains.vdb\", grid = \"grain_3\" }\n";
+    write_text(at("case.toml"), grain + "position = [0, 0, 0]\n" + grain + "position = [0, 0, 0.05]\n[[body]]\nshape = { type = \"sh\", file = \"stone.sh.h5\", id = 7 }\nposition = [0, 0, 0.1]\n[time]\nduration = \"1ms\"\n");
+    const ProgramResult run = run_program("suffuse . --until 0.5ms --quiet", folder.path());
+    ASSERT_EQ(run.exit_code, 0) << run.err;
+    const Json results = describe("results.h5");
+    std::vector<std::string> tools;
+    for (const Json& step : results["history"]) tools.push_back(step["tool"]);
+    EXPECT_EQ(tools, (std::vector<std::string>{"csct2ls", "ls2sh", "suffuse"}));
+    EXPECT_EQ(H5File::open(at("checkpoint.h5")).string_attribute("/", "history"), H5File::open(at("results.h5")).string_attribute("/", "history"));
+}
+
 }  // namespace
 }  // namespace coral::test
