@@ -12,6 +12,13 @@ if(CORAL_NATIVE)
     # Never wider than AVX2: with AVX-512 Eigen would sum in another order than on other processors, and GCC 12's header warns of its own
     # variables (GCC bug 105593).
     include(CheckCXXCompilerFlag)
+    include(CheckCXXSourceCompiles)
+    set(CMAKE_REQUIRED_FLAGS -march=native)
+    check_cxx_source_compiles("#if !defined(__AVX512F__) || !defined(__AVX512DQ__) || !defined(__AVX512VL__)
+        #error
+        #endif
+        int main() {}" CORAL_PROCESSOR_HAS_AVX512)
+    unset(CMAKE_REQUIRED_FLAGS)
     check_cxx_compiler_flag(-mno-avx512f CORAL_COMPILER_KNOWS_AVX512)
     if(CORAL_COMPILER_KNOWS_AVX512)
         add_compile_options(-mno-avx512f)
@@ -27,23 +34,30 @@ endif()
 # Eigen and the standard library are most of what a small file compiles: parsed once, for the modules and for the tests.
 # CGAL's -frounding-math and a sanitizer's flags are theirs alone: where flags differ GCC ignores the header and says so.
 function(coral_precompiled name)
-    cmake_parse_arguments(arg "" "" "HEADERS;LIBS" ${ARGN})
+    cmake_parse_arguments(arg "" "" "HEADERS;LIBS;OPTIONS" ${ARGN})
     file(CONFIGURE OUTPUT ${PROJECT_BINARY_DIR}/${name}.cpp CONTENT "")
     add_library(${name} STATIC ${PROJECT_BINARY_DIR}/${name}.cpp)
     target_link_libraries(${name} PRIVATE Eigen3::Eigen ${arg_LIBS} coral::warnings)
+    target_compile_options(${name} PRIVATE ${arg_OPTIONS})
     target_precompile_headers(${name} PRIVATE <Eigen/Core> <Eigen/Geometry> <algorithm> <array> <cmath> <cstdint> <filesystem>
         <functional> <map> <memory> <mutex> <optional> <span> <string> <unordered_map> <vector> ${arg_HEADERS})
 endfunction()
 coral_precompiled(coral_precompiled_lib)
 
-# coral_module(<name> SOURCES a.cpp ... PUBLIC libs... PRIVATE libs...): library coral::<name> of lib/<name>/.
+# coral_module(<name> SOURCES a.cpp ... PUBLIC libs... PRIVATE libs... [OPTIONS flags...]): library coral::<name> of lib/<name>/.
 function(coral_module name)
-    cmake_parse_arguments(arg "" "" "SOURCES;PUBLIC;PRIVATE" ${ARGN})
+    cmake_parse_arguments(arg "" "" "SOURCES;PUBLIC;PRIVATE;OPTIONS" ${ARGN})
     add_library(coral_${name} STATIC ${arg_SOURCES})
     add_library(coral::${name} ALIAS coral_${name})
     target_include_directories(coral_${name} PUBLIC ${PROJECT_SOURCE_DIR}/lib)
     target_link_libraries(coral_${name} PUBLIC ${arg_PUBLIC} PRIVATE ${arg_PRIVATE} coral::warnings)
-    target_precompile_headers(coral_${name} REUSE_FROM coral_precompiled_lib)
+    if(arg_OPTIONS)
+        coral_precompiled(coral_precompiled_${name} OPTIONS ${arg_OPTIONS})
+        target_compile_options(coral_${name} PRIVATE ${arg_OPTIONS})
+        target_precompile_headers(coral_${name} REUSE_FROM coral_precompiled_${name})
+    else()
+        target_precompile_headers(coral_${name} REUSE_FROM coral_precompiled_lib)
+    endif()
 endfunction()
 
 # coral_tool(<name> libs...): program build/<preset>/bin/<name> from tools/<name>.cpp, with its three standard tests.

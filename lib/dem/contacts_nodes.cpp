@@ -1,4 +1,4 @@
-// Contact of surface nodes with a distance field (grid or wall), and the ordered sums of all contact loops.
+// Contact of surface nodes with a distance field (grid or wall).
 #include <cmath>
 #include <limits>
 #include <span>
@@ -384,102 +384,6 @@ void World::Impl::node_loop(double dt)
         out_count[3][block] = std::int32_t(out - begin);
         block_sums[base + block] = s;
     });
-}
-
-// Threads take ranges of bodies and read all contacts, so that every sum runs in the order of the contacts.
-void World::Impl::sum_forces()
-{
-    const std::size_t parts = x.size() > body_grain ? std::size_t(thread_count()) : 1, share = (x.size() + parts - 1) / parts;
-    parallel_blocks(x.size(), std::max(share, std::size_t{1}), [&](std::size_t first, std::size_t last) { sum_forces(first, last); });
-}
-
-// Sums of the bodies first..last; walls belong to the first range.
-void World::Impl::sum_forces(std::size_t first, std::size_t last)
-{
-    for (std::size_t i = first; i < last; ++i) {
-        force[i].setZero();
-        torque[i].setZero();
-    }
-    if (first == 0)
-        for (WallData& wall : walls) wall.force.setZero();
-    const auto ours = [=](Index i) { return std::size_t(i) - first < last - first; };
-    const auto add_point = [&](const PointForce& c) {
-        const bool a = ours(c.a), b = c.b < 0 ? first == 0 : ours(c.b);
-        if (!a && !b) return;
-        if (a) {
-            force[std::size_t(c.a)] += c.total;
-            torque[std::size_t(c.a)] -= c.arm_a * c.moment;
-        }
-        if (!b) return;
-        if (c.b < 0) {
-            walls[std::size_t(-1 - c.b)].force -= c.total;
-        } else {
-            force[std::size_t(c.b)] -= c.total;
-            torque[std::size_t(c.b)] -= c.arm_b * c.moment;
-        }
-    };
-    const auto add_general = [&](const GeneralForce& c) {
-        const Vec3 total = c.normal_force + c.tangential_force;
-        if (ours(c.a)) {
-            force[std::size_t(c.a)] += total;
-            torque[std::size_t(c.a)] += c.torque_a;
-        }
-        if (c.b < 0) {
-            if (first == 0) walls[std::size_t(-1 - c.b)].force -= total;
-        } else if (ours(c.b)) {
-            force[std::size_t(c.b)] -= total;
-            torque[std::size_t(c.b)] += c.torque_b;
-        }
-    };
-    for (std::size_t block = 0; block < out_count[0].size(); ++block) {
-        const PointForce* c = spheres.out.data() + spheres.row[block * row_grain];
-        for (std::int32_t k = 0; k < out_count[0][block]; ++k) add_point(c[k]);
-    }
-    for (std::size_t block = 0; block < out_count[1].size(); ++block)
-        for (std::int32_t k = 0; k < out_count[1][block]; ++k) add_point(sphere_walls.out[block * entry_grain + std::size_t(k)]);
-    for (std::size_t block = 0; block < out_count[2].size(); ++block)
-        for (std::int32_t k = 0; k < out_count[2][block]; ++k) add_general(sphere_grids.out[block * grid_grain + std::size_t(k)]);
-    for (std::size_t block = 0; block < out_count[3].size(); ++block)
-        for (std::int32_t k = 0; k < out_count[3][block]; ++k) add_general(nodes.out[block * node_grain + std::size_t(k)]);
-}
-
-void World::Impl::compute_contacts(double dt)
-{
-    const auto start = std::chrono::steady_clock::now();
-    for (std::vector<Crossing>& list : crossings) list.clear();
-    sphere_loop(dt);
-    sphere_wall_loop(dt);
-    sphere_grid_loop(dt);
-    node_loop(dt);
-    sum_forces();
-    sums = {};
-    for (const LoopSums& s : block_sums) sums.add(s);
-    dissipated_friction += sums.friction;
-    dissipated_damping += sums.damping;
-    counters.contacts += sums.touching;
-    counters.pair_tests += std::int64_t(spheres.other.size() + sphere_walls.body.size() + sphere_grids.sphere.size() + nodes.slave.size());
-    counters.node_tests += sums.node_queries;
-    counters.seconds_pairs += seconds_since(start);
-}
-
-void World::Impl::refresh_forces()
-{
-    if (!lists_valid) make_lists();
-    if (forces_valid) return;
-    const double before = sums.elastic_normal + sums.elastic_tangential;
-    const double friction = dissipated_friction;
-    // Whoever moved the bodies: everything listed is looked at.
-    for (std::size_t i = 0; i < x.size(); ++i)
-        if (in[i] && has_nodes[i]) note_way(i);
-    for (std::size_t k = 0; k < walls.size(); ++k) note_wall_way(k);
-    std::fill(moved2.begin(), moved2.end(), free_path * skin * free_path * skin);
-    std::fill(grid_drift.begin(), grid_drift.end(), free_path * skin);
-    w_before = w;
-    v_end = v;
-    compute_contacts(0.0);
-    // What bodies put in, taken out or moved by the caller changed in the contacts is the caller's work.
-    wall_work += sums.elastic_normal + sums.elastic_tangential - before + dissipated_friction - friction;
-    forces_valid = true;
 }
 
 }  // namespace coral::dem

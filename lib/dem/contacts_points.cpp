@@ -1,5 +1,6 @@
-// Contact loops of spheres against spheres and walls, in closed form. A first pass finds who touches, a second takes them four at a time.
-// Each block of the loop writes its touching contacts into its own part of `out`; sums are taken later, in order.
+// Contact loops of spheres against spheres and walls, in closed form. A first pass finds who touches, a second takes them a register full at a time.
+// Each block of the loop writes who touches into its own part of `out`; sums are taken later, in order.
+#include <algorithm>
 #include <cmath>
 
 #include "core/parallel.h"
@@ -12,71 +13,85 @@ namespace coral::dem {
 namespace {
 
 using detail::all;
-using detail::gather;
-using detail::lane_count;
-using detail::Lanes;
 using detail::PointGroup;
 using detail::PointResult;
+using Lanes = detail::WideLanes;
+using Vec3Lanes = detail::WideVec3Lanes;
+constexpr int lane_count = detail::wide_lane_count;
 
-/// Who a group is made of: `b` counts bodies or walls.
+/// The contacts of a group; lanes beyond the last repeat the first.
 struct Members {
-    int count = 0;
-    Index entry[lane_count], a[lane_count], b[lane_count];
-    const PairLaw* law[lane_count];
-    void fill_up()
+    const PointContact* of;
+    int count;
+    PointContact filled[lane_count];
+    Members(const PointContact* first, std::ptrdiff_t left) : of(first), count(int(std::min(left, std::ptrdiff_t(lane_count))))
     {
-        for (int k = count; k < lane_count; ++k) entry[k] = entry[0], a[k] = a[0], b[k] = b[0], law[k] = law[0];
+        if (count == lane_count) return;
+        for (int k = 0; k < lane_count; ++k) filled[k] = first[k < count ? k : 0];
+        of = filled;
+    }
+    const PointContact& operator[](int k) const { return of[k]; }
+    template <class Of>
+    [[gnu::always_inline]] Lanes numbers(const Of& value) const
+    {
+        return detail::lanes_from<Lanes>([&](int k) { return value(of[k]); });
     }
     template <class Of>
-    Lanes numbers(const Of& of) const
+    [[gnu::always_inline]] Vec3Lanes vectors(const Of& value) const
     {
-        return Lanes{of(0), of(1), of(2), of(3)};
-    }
-    template <class Of>
-    detail::Vec3Lanes vectors(const Of& of) const
-    {
-        return gather(of(0), of(1), of(2), of(3));
+        return detail::wide_vectors([&](int k) -> const Vec3& { return value(of[k]); });
     }
 };
 
-void take_law(const Members& m, PointGroup& g)
+/// Laws of the contacts; one for all where there is one material.
+template <class LawOf>
+[[gnu::always_inline]] inline void take_law(const Members& m, bool one_law, const LawOf& law_of, PointGroup& g)
 {
-    if (m.law[0] == m.law[1] && m.law[0] == m.law[2] && m.law[0] == m.law[3]) {
-        const PairLaw& law = *m.law[0];
-        g.kn = all(law.kn), g.kt = all(law.friction > 0.0 ? law.kt : 0.0), g.friction = all(law.friction), g.cn = all(law.cn), g.ct = all(law.ct);
+    if (one_law) {
+        const PairLaw& law = law_of(m[0]);
+        g.kn = all<Lanes>(law.kn);
+        g.kt = all<Lanes>(law.spring());
+        g.friction = all<Lanes>(law.friction);
+        g.give = all<Lanes>(law.give());
+        g.cn = all<Lanes>(law.cn);
+        g.ct = all<Lanes>(law.ct);
         return;
     }
-    g.kn = m.numbers([&](int k) { return m.law[k]->kn; });
-    g.kt = m.numbers([&](int k) { return m.law[k]->friction > 0.0 ? m.law[k]->kt : 0.0; });
-    g.friction = m.numbers([&](int k) { return m.law[k]->friction; });
-    g.cn = m.numbers([&](int k) { return m.law[k]->cn; });
-    g.ct = m.numbers([&](int k) { return m.law[k]->ct; });
+    const PairLaw* law[lane_count];
+    for (int k = 0; k < lane_count; ++k) law[k] = &law_of(m[k]);
+    const auto numbers = [&](const auto& of) { return detail::lanes_from<Lanes>([&](int k) { return of(*law[k]); }); };
+    g.kn = numbers([](const PairLaw& l) { return l.kn; });
+    g.kt = numbers([](const PairLaw& l) { return l.spring(); });
+    g.friction = numbers([](const PairLaw& l) { return l.friction; });
+    g.give = numbers([](const PairLaw& l) { return l.give(); });
+    g.cn = numbers([](const PairLaw& l) { return l.cn; });
+    g.ct = numbers([](const PairLaw& l) { return l.ct; });
 }
 
-void take_memory(const Members& m, const std::vector<PointMemory>& memory, const std::vector<std::uint8_t>& touch, PointGroup& g)
+[[gnu::always_inline]] inline void take_memory(const Members& m, const std::vector<PointMemory>& memory, PointGroup& g)
 {
-    const PointMemory* of[lane_count];
-    for (int k = 0; k < lane_count; ++k) of[k] = &memory[std::size_t(m.entry[k])];
-    g.old_spring = m.vectors([&](int k) -> const Vec3& { return of[k]->spring; });
-    g.old_normal = m.vectors([&](int k) -> const Vec3& { return of[k]->normal; });
-    g.old_drag = m.vectors([&](int k) -> const Vec3& { return of[k]->drag; });
-    g.old_overlap = m.numbers([&](int k) { return of[k]->overlap; });
-    g.touched = m.numbers([&](int k) { return touch[std::size_t(m.entry[k])] != 0 ? 1.0 : 0.0; });
+    const auto of = [&](const PointContact& c) -> const PointMemory& { return memory[std::size_t(c.entry)]; };
+    g.old_spring = m.vectors([&](const PointContact& c) -> const Vec3& { return of(c).spring; });
+    g.old_normal = m.vectors([&](const PointContact& c) -> const Vec3& { return of(c).normal; });
+    g.old_total = m.vectors([&](const PointContact& c) -> const Vec3& { return of(c).total; });
+    g.old_overlap = m.numbers([&](const PointContact& c) { return of(c).overlap; });
 }
 
 /// Sums over the contacts of a block, lane by lane: added up at its end.
 struct LaneSums {
-    Lanes stored_normal = all(0.0), stored_tangential = all(0.0), friction = all(0.0), damping = all(0.0), depth = all(0.0), deep = all(0.0);
+    Lanes stored_normal = all<Lanes>(0.0), stored_tangential = stored_normal, friction = stored_normal, damping = stored_normal;
+    Lanes depth = stored_normal, deep = stored_normal;
     void add(const Members& m, const PointGroup& g, const PointResult& r, double cap)
     {
-        const Lanes zero = all(0.0), one = all(1.0), there = Lanes{0.0, 1.0, 2.0, 3.0} < all(double(m.count)) ? one : zero;
+        const Lanes zero = all<Lanes>(0.0), number = detail::lanes_from<Lanes>([](int k) { return k; });
+        const Lanes there = number < all<Lanes>(double(m.count)) ? all<Lanes>(1.0) : zero;
         stored_normal += there * r.stored_normal;
         stored_tangential += there * r.stored_tangential;
         friction += there * r.friction;
         damping += there * r.damping;
         const Lanes relative = g.overlap / g.smaller;
         depth = detail::max(depth, there * relative);
-        deep += relative > all(cap) ? there : zero;
+        deep += relative > all<Lanes>(cap) ? there : zero;
     }
     void add_to(LoopSums& s) const
     {
@@ -90,18 +105,13 @@ struct LaneSums {
     }
 };
 
-/// Memory and `out` of a group; `b_id` turns members into what PointForce calls b.
-template <class Id>
-void put_back(const Members& m, const PointGroup& g, const PointResult& r, const Id& b_id, std::vector<PointMemory>& memory,
-              std::vector<std::uint8_t>& touch, PointForce*& out)
+[[gnu::always_inline]] inline void put_back(const Members& m, const PointGroup& g, const PointResult& r, std::vector<PointMemory>& memory,
+                                            std::vector<std::uint8_t>& touch)
 {
-    const detail::Vec3Lanes total = r.force * g.normal + r.tangential, moment = detail::cross(g.normal, r.tangential);
     for (int k = 0; k < m.count; ++k) {
-        const std::size_t e = std::size_t(m.entry[k]);
-        const Vec3 normal = detail::lane(g.normal, k);
-        memory[e] = {detail::lane(r.spring, k), normal, detail::lane(r.drag, k), g.overlap[k]};
+        const std::size_t e = std::size_t(m[k].entry);
+        memory[e] = {detail::lane(r.spring, k), detail::lane(g.normal, k), detail::lane(r.total, k), g.overlap[k]};
         touch[e] = r.force[k] > 0.0 ? 1 : 2;
-        *out++ = {m.a[k], b_id(m.b[k]), m.entry[k], detail::lane(total, k), detail::lane(moment, k), r.force[k], g.overlap[k], r.arm_a[k], r.arm_b[k]};
     }
 }
 
@@ -117,8 +127,9 @@ void open_contact(const Opening& o, PointMemory& memory, std::uint8_t& touch, bo
 {
     const Vec3 full = o.relative - o.spin.cross(memory.normal), slide = full - full.dot(memory.normal) * memory.normal;
     const double pressed = std::min(memory.overlap, cap);
+    const Vec3 drag = memory.total - o.law.kn * pressed * memory.normal + o.law.spring() * memory.spring;
     if (touch == 2 || !facing) s.damping += o.law.kn * pressed * (memory.overlap - 0.5 * pressed);
-    else s.damping -= 0.5 * dt * memory.drag.dot(full);
+    else s.damping -= 0.5 * dt * drag.dot(full);
     if (o.law.friction > 0.0) s.friction += 0.5 * o.law.kt * (memory.spring.squaredNorm() + dt * memory.spring.dot(slide));
     if (facing && touch == 1 && dt > 0.0)
         detail::add_crossing(crossing, o.a, o.b, o.law, memory.overlap, o.overlap, o.approach, o.root_mass, dt, o.normal, s);
@@ -145,10 +156,8 @@ void World::Impl::sphere_loop(double dt)
         LaneSums sums_of_lanes;
         std::vector<Crossing>& crossing = crossings[block];
         const Index from = l.row[first];
-        PointForce* const begin = l.out.data() + from;
-        PointForce* out = begin;
-
-        Index touching = from;
+        PointContact* const begin = l.out.data() + from;
+        PointContact* touching = begin;
         for (std::size_t r = first; r < last; ++r) {
             const std::size_t i = std::size_t(l.rows[r]);
             const Vec3 xi = x[i];
@@ -157,8 +166,7 @@ void World::Impl::sphere_loop(double dt)
                 const std::size_t j = std::size_t(l.other[k]);
                 const double reach = ri + radius[j], d2 = periodic(xi - x[j]).squaredNorm();
                 if (d2 < reach * reach) {
-                    l.near[touching] = k;
-                    l.near_row[touching++] = Index(i);
+                    *touching++ = {Index(i), Index(j), k};
                 } else if (l.touch[k] != 0) {
                     PointMemory& memory = l.memory[k];
                     const Vec3 d = periodic(xi - x[j]), n = d / d.norm();
@@ -170,31 +178,24 @@ void World::Impl::sphere_loop(double dt)
             }
         }
 
-        for (Index at = from; at < touching; at += lane_count) {
-            Members m;
-            m.count = std::min(int(touching - at), lane_count);
-            for (int k = 0; k < m.count; ++k) {
-                m.entry[k] = l.near[at + k];
-                m.a[k] = l.near_row[at + k];
-                m.b[k] = l.other[m.entry[k]];
-                m.law[k] = &law(material[std::size_t(m.a[k])], material[std::size_t(m.b[k])]);
-            }
-            m.fill_up();
-            const auto of_a = [&](const std::vector<Vec3>& field) { return m.vectors([&](int k) -> const Vec3& { return field[std::size_t(m.a[k])]; }); };
-            const auto of_b = [&](const std::vector<Vec3>& field) { return m.vectors([&](int k) -> const Vec3& { return field[std::size_t(m.b[k])]; }); };
+        for (const PointContact* at = begin; at < touching; at += lane_count) {
+            const Members m(at, touching - at);
+            const auto of_a = [&](const std::vector<Vec3>& field) { return m.vectors([&](const PointContact& c) -> const Vec3& { return field[std::size_t(c.a)]; }); };
+            const auto of_b = [&](const std::vector<Vec3>& field) { return m.vectors([&](const PointContact& c) -> const Vec3& { return field[std::size_t(c.b)]; }); };
+            const auto law_of = [&](const PointContact& c) -> const PairLaw& { return law(material[std::size_t(c.a)], material[std::size_t(c.b)]); };
             PointGroup g;
-            take_law(m, g);
-            take_memory(m, l.memory, l.touch, g);
+            take_law(m, laws.size() == 1, law_of, g);
+            take_memory(m, l.memory, g);
             g.relative = of_a(v) - of_b(v);
             g.spin_a = of_a(w);
             g.spin_b = of_b(w);
-            g.radius_a = m.numbers([&](int k) { return radius[std::size_t(m.a[k])]; });
-            g.radius_b = m.numbers([&](int k) { return radius[std::size_t(m.b[k])]; });
+            g.radius_a = m.numbers([&](const PointContact& c) { return radius[std::size_t(c.a)]; });
+            g.radius_b = m.numbers([&](const PointContact& c) { return radius[std::size_t(c.b)]; });
             g.smaller = detail::min(g.radius_a, g.radius_b);
-            g.share = all(0.5);
-            g.root_mass = m.numbers([&](int k) { return l.root_mass[m.entry[k]]; });
-            const detail::Vec3Lanes d = periodic(of_a(x) - of_b(x));
-            const Lanes length = detail::sqrt(detail::dot(d, d)), none = all(0.0), one = all(1.0);
+            g.share = all<Lanes>(0.5);
+            g.root_mass = m.numbers([&](const PointContact& c) { return l.root_mass[std::size_t(c.entry)]; });
+            const Vec3Lanes d = periodic(of_a(x) - of_b(x));
+            const Lanes length = detail::sqrt(detail::dot(d, d)), none = all<Lanes>(0.0), one = all<Lanes>(1.0);
             const Lanes inverse = length > none ? one / (length > none ? length : one) : none;
             g.normal = inverse * d;
             g.normal.z = length > none ? g.normal.z : one;
@@ -202,18 +203,18 @@ void World::Impl::sphere_loop(double dt)
             g.approach = detail::dot(of_b(v_end) - of_a(v_end), g.normal);
             const PointResult r = detail::point_law(g, options.overlap_cap, dt);
             for (int k = 0; k < m.count; ++k)
-                if (l.touch[m.entry[k]] == 0 && dt > 0.0) {
+                if (l.touch[m[k].entry] == 0 && dt > 0.0) {
                     const Vec3 past = detail::lane(d, k) - dt * detail::lane(g.relative, k);
-                    detail::add_crossing(crossing, m.a[k], m.b[k], *m.law[k], g.radius_a[k] + g.radius_b[k] - past.norm(), g.overlap[k], g.approach[k],
+                    detail::add_crossing(crossing, m[k].a, m[k].b, law_of(m[k]), g.radius_a[k] + g.radius_b[k] - past.norm(), g.overlap[k], g.approach[k],
                                          g.root_mass[k], dt, detail::lane(g.normal, k), s);
                 }
-            put_back(m, g, r, [](Index b) { return b; }, l.memory, l.touch, out);
+            put_back(m, g, r, l.memory, l.touch);
             sums_of_lanes.add(m, g, r, options.overlap_cap);
         }
         sums_of_lanes.add_to(s);
         s.tests = l.row[last] - from;
-        s.touching = out - begin;
-        out_count[0][block] = std::int32_t(out - begin);
+        s.touching = touching - begin;
+        out_count[0][block] = std::int32_t(touching - begin);
         block_sums[block] = s;
     });
 }
@@ -227,10 +228,8 @@ void World::Impl::sphere_wall_loop(double dt)
         LoopSums s;
         LaneSums sums_of_lanes;
         std::vector<Crossing>& crossing = crossings[base + block];
-        PointForce* const begin = l.out.data() + first;
-        PointForce* out = begin;
-
-        std::size_t touching = first;
+        PointContact* const begin = l.out.data() + first;
+        PointContact* touching = begin;
         for (std::size_t k = first; k < last; ++k) {
             const std::size_t i = std::size_t(l.body[k]);
             const WallData& wall = walls[std::size_t(l.wall[k])];
@@ -242,9 +241,9 @@ void World::Impl::sphere_wall_loop(double dt)
             else distance = wall.distance_and_gradient(x[i], n);
             const double overlap = facing ? radius[i] - distance : -1.0;
             if (overlap > 0.0) {
-                l.near[touching] = Index(k);
-                l.near_normal[touching] = n;
-                l.near_overlap[touching++] = overlap;
+                l.near_normal[k] = n;
+                l.near_overlap[k] = overlap;
+                *touching++ = {Index(i), -1 - l.wall[k], Index(k)};
             } else if (l.touch[k] != 0) {
                 open_contact({Index(i), -1 - l.wall[k], law(material[i], wall.material), v[i] - wall.velocity, (radius[i] - l.memory[k].overlap) * w[i], n,
                               overlap, (wall.velocity - v_end[i]).dot(n), std::sqrt(mass[i])},
@@ -252,47 +251,39 @@ void World::Impl::sphere_wall_loop(double dt)
             }
         }
 
-        for (std::size_t at = first; at < touching; at += lane_count) {
-            Members m;
-            m.count = int(std::min(touching - at, std::size_t(lane_count)));
-            std::size_t place[lane_count];
-            for (int k = 0; k < lane_count; ++k) place[k] = at + std::size_t(k < m.count ? k : 0);
-            for (int k = 0; k < m.count; ++k) {
-                m.entry[k] = l.near[place[k]];
-                m.a[k] = l.body[m.entry[k]];
-                m.b[k] = l.wall[m.entry[k]];
-                m.law[k] = &law(material[std::size_t(m.a[k])], walls[std::size_t(m.b[k])].material);
-            }
-            m.fill_up();
-            const auto of_a = [&](const std::vector<Vec3>& field) { return m.vectors([&](int k) -> const Vec3& { return field[std::size_t(m.a[k])]; }); };
-            const auto wall_velocity = m.vectors([&](int k) -> const Vec3& { return walls[std::size_t(m.b[k])].velocity; });
+        for (const PointContact* at = begin; at < touching; at += lane_count) {
+            const Members m(at, touching - at);
+            const auto wall_of = [&](const PointContact& c) -> const WallData& { return walls[std::size_t(-1 - c.b)]; };
+            const auto of_a = [&](const std::vector<Vec3>& field) { return m.vectors([&](const PointContact& c) -> const Vec3& { return field[std::size_t(c.a)]; }); };
+            const auto wall_velocity = m.vectors([&](const PointContact& c) -> const Vec3& { return wall_of(c).velocity; });
+            const auto law_of = [&](const PointContact& c) -> const PairLaw& { return law(material[std::size_t(c.a)], wall_of(c).material); };
             PointGroup g;
-            take_law(m, g);
-            take_memory(m, l.memory, l.touch, g);
+            take_law(m, laws.size() == 1, law_of, g);
+            take_memory(m, l.memory, g);
             g.relative = of_a(v) - wall_velocity;
             g.spin_a = of_a(w);
-            g.spin_b = {all(0.0), all(0.0), all(0.0)};
-            g.radius_a = g.smaller = m.numbers([&](int k) { return radius[std::size_t(m.a[k])]; });
-            g.radius_b = all(0.0);
-            g.share = all(1.0);
-            g.root_mass = detail::sqrt(m.numbers([&](int k) { return mass[std::size_t(m.a[k])]; }));
-            g.normal = m.vectors([&](int k) -> const Vec3& { return l.near_normal[place[k]]; });
-            g.overlap = m.numbers([&](int k) { return l.near_overlap[place[k]]; });
+            g.spin_b = {all<Lanes>(0.0), all<Lanes>(0.0), all<Lanes>(0.0)};
+            g.radius_a = g.smaller = m.numbers([&](const PointContact& c) { return radius[std::size_t(c.a)]; });
+            g.radius_b = all<Lanes>(0.0);
+            g.share = all<Lanes>(1.0);
+            g.root_mass = detail::sqrt(m.numbers([&](const PointContact& c) { return mass[std::size_t(c.a)]; }));
+            g.normal = m.vectors([&](const PointContact& c) -> const Vec3& { return l.near_normal[std::size_t(c.entry)]; });
+            g.overlap = m.numbers([&](const PointContact& c) { return l.near_overlap[std::size_t(c.entry)]; });
             g.approach = detail::dot(wall_velocity - of_a(v_end), g.normal);
             const PointResult r = detail::point_law(g, options.overlap_cap, dt);
             for (int k = 0; k < m.count; ++k)
-                if (l.touch[m.entry[k]] == 0 && dt > 0.0) {
+                if (l.touch[m[k].entry] == 0 && dt > 0.0) {
                     const Vec3 n = detail::lane(g.normal, k), way = dt * detail::lane(g.relative, k);
-                    const double past = overlap_before(walls[std::size_t(m.b[k])], x[std::size_t(m.a[k])], way, n, g.overlap[k]);
-                    detail::add_crossing(crossing, m.a[k], -1 - m.b[k], *m.law[k], past, g.overlap[k], g.approach[k], g.root_mass[k], dt, n, s);
+                    const double past = overlap_before(wall_of(m[k]), x[std::size_t(m[k].a)], way, n, g.overlap[k]);
+                    detail::add_crossing(crossing, m[k].a, m[k].b, law_of(m[k]), past, g.overlap[k], g.approach[k], g.root_mass[k], dt, n, s);
                 }
-            put_back(m, g, r, [](Index b) { return -1 - b; }, l.memory, l.touch, out);
+            put_back(m, g, r, l.memory, l.touch);
             sums_of_lanes.add(m, g, r, options.overlap_cap);
         }
         sums_of_lanes.add_to(s);
         s.tests = std::int64_t(last - first);
-        s.touching = out - begin;
-        out_count[1][block] = std::int32_t(out - begin);
+        s.touching = touching - begin;
+        out_count[1][block] = std::int32_t(touching - begin);
         block_sums[base + block] = s;
     });
 }

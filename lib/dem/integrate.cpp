@@ -12,20 +12,20 @@ namespace coral::dem {
 namespace {
 
 /// Unit length for a quaternion that has it but for rounding or a small turn.
-void renormalize(Quat& q)
+void renormalize(double w, double x, double y, double z, Quat& q)
 {
-    const double length2 = q.squaredNorm();
-    if (std::abs(length2 - 1.0) < 1e-4) q.coeffs() *= 1.5 - 0.5 * length2;  // one Newton step of 1/sqrt, no root and no division
-    else q.normalize();
+    const double length2 = w * w + x * x + y * y + z * z;
+    // One Newton step of 1/sqrt, no root and no division.
+    const double to_one = std::abs(length2 - 1.0) < 1e-4 ? 1.5 - 0.5 * length2 : 1.0 / std::sqrt(length2);
+    q.w() = to_one * w, q.x() = to_one * x, q.y() = to_one * y, q.z() = to_one * z;
 }
 
-/// Turn by a small angle, second order and of unit length: enough for spheres, whose orientation is for looking at only.
+/// Turn by a small angle, second order and of unit length: enough for spheres, whose orientation is for looking at only. In plain numbers: Eigen's
+/// quaternions are written by halves and read whole, which stalls.
 void turn_sphere(Quat& q, const Vec3& turn)
 {
-    const Vec3 h = 0.5 * turn;
-    const Quat step(1.0, h.x(), h.y(), h.z());
-    q = step * q;
-    renormalize(q);
+    const double w = q.w(), x = q.x(), y = q.y(), z = q.z(), a = 0.5 * turn.x(), b = 0.5 * turn.y(), c = 0.5 * turn.z();
+    renormalize(w - (a * x + b * y + c * z), x + (a * w + b * z - c * y), y + (b * w + c * x - a * z), z + (c * w + a * y - b * x), q);
 }
 
 struct SineCosine {
@@ -113,19 +113,17 @@ void World::Impl::check_step(double dt) const
 }
 
 // Kick of one body over dt; the spin of a body with nodes is left for the caller to renew. Returns the energy that its added mass takes up.
+// Number by number, here and in drift_bodies: vectors that are copied in a piece of two and one of one stall whoever reads them next.
 inline double World::Impl::kick_body(std::size_t i, double dt, const Vec3& g_dt)
 {
-    double taken = 0.0;
-    if (i < added_mass.size() && added_mass[i] != Vec3::Zero())
-        taken = kick_with_added_mass(i, dt);
-    else if (any_external)
-        v[i] += (inverse_mass[i] * dt) * (force[i] + external_force[i]) + g_dt;
-    else
-        v[i] += (inverse_mass[i] * dt) * force[i] + g_dt;
-    Vec3 impulse = dt * torque[i];
-    if (any_external) impulse += dt * external_torque[i];
-    if (has_nodes[i]) momentum[i] += impulse;
-    else w[i] += inverse_inertia[i] * impulse;
+    const bool heavier = i < added_mass.size() && added_mass[i] != Vec3::Zero();
+    const double taken = heavier ? kick_with_added_mass(i, dt) : 0.0;
+    const double share = inverse_mass[i] * dt, turn = has_nodes[i] ? dt : inverse_inertia[i] * dt;
+    Vec3& spin = has_nodes[i] ? momentum[i] : w[i];
+    for (int k = 0; k < 3; ++k) {
+        if (!heavier) v[i][k] += share * (any_external ? force[i][k] + external_force[i][k] : force[i][k]) + g_dt[k];
+        spin[k] += turn * (any_external ? torque[i][k] + external_torque[i][k] : torque[i][k]);
+    }
     return taken;
 }
 
@@ -180,14 +178,19 @@ World::Impl::Drift World::Impl::drift_bodies(std::size_t first, std::size_t last
             v_end[i] = v[i];
             if (motion[i] == Motion::fixed) continue;
         } else {
-            const Vec3 before = v[i];
+            for (int k = 0; k < 3; ++k) v_end[i][k] = -v[i][k];
             sum.external_work -= kick_body(i, 0.5 * dt, half_g);
-            v_end[i] = 2.0 * v[i] - before;
+            for (int k = 0; k < 3; ++k) v_end[i][k] += 2.0 * v[i][k];
         }
-        const Vec3 way = dt * v[i];
-        x[i] += way;
-        sum.finite += v[i].squaredNorm() + w[i].squaredNorm();
-        const double way2 = (x[i] - x_reference[i]).squaredNorm();
+        double way2 = 0.0, speed2 = 0.0, fall = 0.0;
+        for (int k = 0; k < 3; ++k) {
+            const double way = dt * v[i][k], now = x[i][k] + way, from = now - x_reference[i][k];
+            x[i][k] = now;
+            way2 += from * from;
+            speed2 += v[i][k] * v[i][k] + w[i][k] * w[i][k];
+            fall += options.gravity[k] * way;
+        }
+        sum.finite += speed2;
         moved2[i] = way2;
         farthest2 = std::max(farthest2, way2);
         Vec3 turn = dt * w[i];
@@ -203,8 +206,8 @@ World::Impl::Drift World::Impl::drift_bodies(std::size_t first, std::size_t last
             turn_sphere(q[i], turn);
         }
         if (motion[i] != Motion::free) continue;
-        sum.gravity_work += mass[i] * options.gravity.dot(way);
-        if (any_external) sum.external_work += external_force[i].dot(way) + external_torque[i].dot(turn);
+        sum.gravity_work += mass[i] * fall;
+        if (any_external) sum.external_work += dt * external_force[i].dot(v[i]) + external_torque[i].dot(turn);
     }
     sum.farthest = std::max(sum.farthest, std::sqrt(farthest2));
     return sum;
@@ -220,7 +223,7 @@ void World::Impl::turn_grid(std::size_t i, double dt)
         Vec3 b = before.conjugate() * momentum[i];
         w_before[i] = before * b.cwiseProduct(inverse);
         Quat after = before * free_rotation(b, inverse, dt);
-        renormalize(after);
+        renormalize(after.w(), after.x(), after.y(), after.z(), after);
         q[i] = after * principal_axes.conjugate();
         w[i] = after * b.cwiseProduct(inverse);
         return;

@@ -10,11 +10,17 @@ namespace coral::dem {
 
 namespace {
 
-Contact report(const World::Impl& m, const PointForce& c)
+const PointMemory& memory_of(const World::Impl& m, const PointContact& c)
 {
-    const Vec3& normal = (c.b < 0 ? m.sphere_walls.memory : m.spheres.memory)[std::size_t(c.entry)].normal;
-    const Vec3 push = c.force * normal;
-    return {c.a, c.b, m.x[std::size_t(c.a)] - c.arm_a * normal, normal, push, c.total - push, c.overlap, 1};
+    return (c.b < 0 ? m.sphere_walls.memory : m.spheres.memory)[std::size_t(c.entry)];
+}
+
+Contact report(const World::Impl& m, const PointContact& c)
+{
+    const PointMemory& memory = memory_of(m, c);
+    const double arm = m.radius[std::size_t(c.a)] - (c.b < 0 ? 1.0 : 0.5) * memory.overlap;
+    const Vec3 push = memory.total.dot(memory.normal) * memory.normal;
+    return {c.a, c.b, m.x[std::size_t(c.a)] - arm * memory.normal, memory.normal, push, memory.total - push, memory.overlap, 1};
 }
 
 Contact report(const World::Impl& m, const GeneralForce& c)
@@ -111,7 +117,7 @@ Statistics World::statistics() const
         }
     };
     for_each_contact(m, [&](const auto& c) {
-        if constexpr (std::is_same_v<std::decay_t<decltype(c)>, PointForce>) note(c.a, c.b, c.force);
+        if constexpr (std::is_same_v<std::decay_t<decltype(c)>, PointContact>) note(c.a, c.b, memory_of(m, c).total.dot(memory_of(m, c).normal));
         else note(c.a, c.b, c.normal_force.norm());
     });
     for (std::size_t i = 0; i < m.x.size(); ++i) {

@@ -8,7 +8,7 @@ namespace coral::dem {
 
 namespace {
 
-constexpr std::uint64_t magic = 0x3630'4d45'4452'4f43;  // "CORDEM06"
+constexpr std::uint64_t magic = 0x3730'4d45'4452'4f43;  // "CORDEM07"
 constexpr std::uint64_t magic_name = 0x0000'ffff'ffff'ffff;  // the part without the version
 
 std::uint64_t checksum(std::span<const std::uint8_t> bytes)

@@ -17,6 +17,8 @@ using Vec3 = Eigen::Vector3d;
 struct PairLaw {
     double kn = 0, kt = 0, friction = 0, damping = 0;
     double cn = 0, ct = 0;  ///< 2 zeta sqrt(kn), 2 zeta sqrt(kt); times sqrt(m*) they are the dashpots
+    double spring() const { return friction > 0.0 ? kt : 0.0; }                  ///< of friction
+    double give() const { return spring() > 0.0 ? friction / spring() : 0.0; }  ///< longest spring over the normal force
 };
 
 /// Energies of the contacts of a block of the loop; summed block by block, in order.
@@ -120,7 +122,8 @@ struct Periodic {
             for (int k = 0; k < 3; ++k) r[k] -= length[k] * std::nearbyint(r[k] * inverse[k]);
         return r;
     }
-    Vec3Lanes operator()(Vec3Lanes r) const
+    template <class V>
+    VectorsOf<V> operator()(VectorsOf<V> r) const
     {
         if (any) {
             r.x -= length.x() * nearbyint(r.x * inverse.x());

@@ -52,20 +52,17 @@ struct WallData {
     double relative_curvature(double r) const { return kind == Kind::cylinder ? std::sqrt(1.0 - std::min(r / radius, 0.75)) : 1.0; }
 };
 
-/// One-point contact of a sphere with a sphere or a wall, as the loops leave it for summation and reports.
-struct PointForce {
-    Index a = 0, b = 0;                                 ///< b < 0: wall -1 - b
-    Index entry = 0;                                    ///< in its list, whose memory has the normal
-    Vec3 total = Vec3::Zero(), moment = Vec3::Zero();  ///< force on a; normal x tangential force
-    double force = 0, overlap = 0;                      ///< normal force; depth
-    double arm_a = 0, arm_b = 0;                        ///< distance of the contact point from the centres along the normal
+/// One-point contact of a sphere with a sphere or a wall; the rest is in the memory of its list.
+struct PointContact {
+    Index a = 0, b = 0;  ///< b < 0: wall -1 - b
+    Index entry = 0;     ///< in its list
 };
 
-/// What a one-point contact keeps from one step to the next.
+/// What a one-point contact keeps from one step to the next, and what sums and reports take it from.
 struct PointMemory {
     Vec3 spring = Vec3::Zero();
     Vec3 normal = Vec3::Zero();  ///< at the end of the last step
-    Vec3 drag = Vec3::Zero();    ///< force on a that is not elastic, at the end of the last step: its work is dissipated
+    Vec3 total = Vec3::Zero();   ///< force on a then; what of it is no spring's is dissipated
     double overlap = 0;
 };
 
@@ -94,31 +91,22 @@ struct SphereList {
     std::vector<PointMemory> memory;
     std::vector<std::uint8_t> touch;  ///< 0 apart, 1 touching, 2 touching without force (clamped)
     std::vector<double> root_mass;    ///< sqrt(m*)
-    std::vector<PointForce> out;
-    std::vector<Index> rows;  ///< spheres with partners
-    std::vector<Index> near;  ///< for the loop: entries that touch, block by block
-    std::vector<Index> near_row;
+    std::vector<PointContact> out;    ///< who touches, block by block
+    std::vector<Index> rows;          ///< spheres with partners
     /// Of what the loop writes, for the entries that are there.
-    void make_room()
-    {
-        out.resize(other.size());
-        near.resize(other.size());
-        near_row.resize(other.size());
-    }
+    void make_room() { out.resize(other.size()); }
 };
 
 struct SphereWallList {
     std::vector<Index> body, wall;
     std::vector<std::uint8_t> feature, touch;
     std::vector<PointMemory> memory;
-    std::vector<PointForce> out;
-    std::vector<Index> near;        ///< as above
-    std::vector<Vec3> near_normal;
+    std::vector<PointContact> out;
+    std::vector<Vec3> near_normal;  ///< for the loop: of those that touch
     std::vector<double> near_overlap;
     void make_room()
     {
         out.resize(body.size());
-        near.resize(body.size());
         near_normal.resize(body.size());
         near_overlap.resize(body.size());
     }

@@ -1,10 +1,14 @@
 #pragma once
 /// \file dem/detail/lanes.h
-/// Four numbers, or four vectors, side by side: contacts are worked four at a time. Every lane does what scalar code would, in the same
+/// Numbers, or vectors, side by side: contacts are worked four or eight at a time. Every lane does what scalar code would, in the same
 /// order, so a contact's result does not depend on its neighbours in a group.
 #include <Eigen/Core>
 #include <cmath>
 #include <numbers>
+#include <utility>
+#ifdef CORAL_AVX512
+#include <immintrin.h>
+#endif
 
 namespace coral::dem::detail {
 
@@ -14,25 +18,47 @@ namespace coral::dem::detail {
 
 typedef double Lanes __attribute__((vector_size(32)));
 typedef float FloatLanes __attribute__((vector_size(16)));
+/// As many as a register of the processor holds, four at least: loops with long chains of roots and divisions hide them behind each other.
+#ifdef CORAL_AVX512
+typedef double WideLanes __attribute__((vector_size(64)));
+#else
+typedef Lanes WideLanes;
+#endif
 
-constexpr int lane_count = 4;
+template <class V>
+constexpr int lanes_of = sizeof(V) / sizeof(double);
+constexpr int lane_count = lanes_of<Lanes>, wide_lane_count = lanes_of<WideLanes>;
 
-[[gnu::always_inline]] inline Lanes all(double value) { return Lanes{value, value, value, value}; }
-[[gnu::always_inline]] inline Lanes widened(FloatLanes a) { return __builtin_convertvector(a, Lanes); }
-[[gnu::always_inline]] inline Lanes sqrt(Lanes a)
+/// of(0), of(1), ... in the lanes.
+template <class V, class Of>
+[[gnu::always_inline]] inline V lanes_from(const Of& of)
 {
-    Lanes root;
-    for (int k = 0; k < lane_count; ++k) root[k] = std::sqrt(a[k]);
+    return [&]<std::size_t... k>(std::index_sequence<k...>) { return V{double(of(int(k)))...}; }(std::make_index_sequence<lanes_of<V>>());
+}
+template <class V = Lanes>
+[[gnu::always_inline]] inline V all(double value)
+{
+    return lanes_from<V>([=](int) { return value; });
+}
+[[gnu::always_inline]] inline Lanes widened(FloatLanes a) { return __builtin_convertvector(a, Lanes); }
+template <class V>
+[[gnu::always_inline]] inline V sqrt(V a)
+{
+    V root;
+    for (int k = 0; k < lanes_of<V>; ++k) root[k] = std::sqrt(a[k]);
     return root;
 }
-[[gnu::always_inline]] inline Lanes nearbyint(Lanes a)
+template <class V>
+[[gnu::always_inline]] inline V nearbyint(V a)
 {
-    Lanes whole;
-    for (int k = 0; k < lane_count; ++k) whole[k] = std::nearbyint(a[k]);
+    V whole;
+    for (int k = 0; k < lanes_of<V>; ++k) whole[k] = std::nearbyint(a[k]);
     return whole;
 }
-[[gnu::always_inline]] inline Lanes min(Lanes a, Lanes b) { return a < b ? a : b; }
-[[gnu::always_inline]] inline Lanes max(Lanes a, Lanes b) { return a > b ? a : b; }
+template <class V>
+[[gnu::always_inline]] inline V min(V a, V b) { return a < b ? a : b; }
+template <class V>
+[[gnu::always_inline]] inline V max(V a, V b) { return a > b ? a : b; }
 
 /// Argument of re + i im, between -pi and pi, to two units in the last place: the rational form of Cephes (Moshier 1989) for the arc tangent
 /// below tan(3 pi/16), 45 degrees taken off above pi/8.
@@ -51,26 +77,95 @@ constexpr int lane_count = 4;
     return im < zero ? -angle : angle;
 }
 
-[[gnu::always_inline]] inline double sum(Lanes a) { return (a[0] + a[1]) + (a[2] + a[3]); }
+/// In pairs, pairs of pairs and so on.
+template <class V>
+[[gnu::always_inline]] inline double sum(V a)
+{
+    double part[lanes_of<V>];
+    for (int k = 0; k < lanes_of<V>; ++k) part[k] = a[k];
+    for (int apart = 1; apart < lanes_of<V>; apart *= 2)
+        for (int k = 0; k < lanes_of<V>; k += 2 * apart) part[k] += part[k + apart];
+    return part[0];
+}
 
-struct Vec3Lanes {
-    Lanes x, y, z;
+/// Of what a comparison gives.
+template <class Mask>
+[[gnu::always_inline]] inline bool any(Mask mask)
+{
+    long long some = 0;
+    for (int k = 0; k < int(sizeof(Mask) / sizeof(long long)); ++k) some |= mask[k];
+    return some != 0;
+}
+
+template <class V>
+struct VectorsOf {
+    V x, y, z;
 };
-[[gnu::always_inline]] inline Vec3Lanes operator+(const Vec3Lanes& a, const Vec3Lanes& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
-[[gnu::always_inline]] inline Vec3Lanes operator-(const Vec3Lanes& a, const Vec3Lanes& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
-[[gnu::always_inline]] inline Vec3Lanes operator*(Lanes s, const Vec3Lanes& a) { return {s * a.x, s * a.y, s * a.z}; }
-[[gnu::always_inline]] inline Lanes dot(const Vec3Lanes& a, const Vec3Lanes& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-[[gnu::always_inline]] inline Vec3Lanes cross(const Vec3Lanes& a, const Vec3Lanes& b)
+using Vec3Lanes = VectorsOf<Lanes>;
+using WideVec3Lanes = VectorsOf<WideLanes>;
+template <class V>
+[[gnu::always_inline]] inline VectorsOf<V> operator+(const VectorsOf<V>& a, const VectorsOf<V>& b)
+{
+    return {a.x + b.x, a.y + b.y, a.z + b.z};
+}
+template <class V>
+[[gnu::always_inline]] inline VectorsOf<V> operator-(const VectorsOf<V>& a, const VectorsOf<V>& b)
+{
+    return {a.x - b.x, a.y - b.y, a.z - b.z};
+}
+template <class V>
+[[gnu::always_inline]] inline VectorsOf<V> operator*(V s, const VectorsOf<V>& a)
+{
+    return {s * a.x, s * a.y, s * a.z};
+}
+template <class V>
+[[gnu::always_inline]] inline V dot(const VectorsOf<V>& a, const VectorsOf<V>& b)
+{
+    return a.x * b.x + a.y * b.y + a.z * b.z;
+}
+template <class V>
+[[gnu::always_inline]] inline VectorsOf<V> cross(const VectorsOf<V>& a, const VectorsOf<V>& b)
 {
     return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 
-/// Vectors at four places, one a lane.
+/// Vectors of(0), of(1), ..., one a lane.
+template <class V, class Of>
+[[gnu::always_inline]] inline VectorsOf<V> vectors_from(const Of& of)
+{
+    return {lanes_from<V>([&](int k) { return of(k).x(); }), lanes_from<V>([&](int k) { return of(k).y(); }), lanes_from<V>([&](int k) { return of(k).z(); })};
+}
 [[gnu::always_inline]] inline Vec3Lanes gather(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c, const Eigen::Vector3d& d)
 {
     return {Lanes{a.x(), b.x(), c.x(), d.x()}, Lanes{a.y(), b.y(), c.y(), d.y()}, Lanes{a.z(), b.z(), c.z(), d.z()}};
 }
-[[gnu::always_inline]] inline Eigen::Vector3d lane(const Vec3Lanes& v, int k) { return {v.x[k], v.y[k], v.z[k]}; }
+
+#ifdef CORAL_AVX512
+/// Eight vectors of(0), of(1), ...: a load and a few shuffles each instead of a load a number.
+template <class Of>
+[[gnu::always_inline]] inline WideVec3Lanes wide_vectors(const Of& of)
+{
+    const auto half = [&](int k) { return Lanes(_mm256_maskz_loadu_pd(7, of(k).data())); };
+    const auto both = [&](int k) { return __builtin_shufflevector(half(k), half(k + 4), 0, 1, 2, 3, 4, 5, 6, 7); };
+    const WideLanes a = both(0), b = both(1), c = both(2), d = both(3);
+    const WideLanes xz_ab = __builtin_shufflevector(a, b, 0, 8, 2, 10, 4, 12, 6, 14), y_ab = __builtin_shufflevector(a, b, 1, 9, 3, 11, 5, 13, 7, 15);
+    const WideLanes xz_cd = __builtin_shufflevector(c, d, 0, 8, 2, 10, 4, 12, 6, 14), y_cd = __builtin_shufflevector(c, d, 1, 9, 3, 11, 5, 13, 7, 15);
+    return {__builtin_shufflevector(xz_ab, xz_cd, 0, 1, 8, 9, 4, 5, 12, 13), __builtin_shufflevector(y_ab, y_cd, 0, 1, 8, 9, 4, 5, 12, 13),
+            __builtin_shufflevector(xz_ab, xz_cd, 2, 3, 10, 11, 6, 7, 14, 15)};
+}
+#else
+template <class Of>
+[[gnu::always_inline]] inline WideVec3Lanes wide_vectors(const Of& of)
+{
+    return vectors_from<WideLanes>(of);
+}
+#endif
+
+template <class V>
+[[gnu::always_inline]] inline Eigen::Vector3d lane(const VectorsOf<V>& v, int k)
+{
+    return {v.x[k], v.y[k], v.z[k]};
+}
 
 #pragma GCC diagnostic pop
 
