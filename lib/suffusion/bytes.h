@@ -65,7 +65,7 @@ public:
     std::vector<T> array()
     {
         const std::int64_t count = integer();
-        if (count < 0 || static_cast<std::uint64_t>(count) > bytes_.size() / sizeof(T)) throw Error("checkpoint.h5", "is damaged", "run without --resume");
+        if (count < 0 || static_cast<std::uint64_t>(count) > bytes_.size() / sizeof(T)) throw Error("checkpoint.h5", "is damaged, or another version of the tools wrote it", "run without --resume, or resume with that version");
         std::vector<T> values(static_cast<std::size_t>(count));
         take(values.data(), values.size() * sizeof(T));
         return values;
@@ -81,7 +81,7 @@ public:
 private:
     void take(void* data, std::size_t size)
     {
-        if (size > bytes_.size()) throw Error("checkpoint.h5", "is damaged", "run without --resume");
+        if (size > bytes_.size()) throw Error("checkpoint.h5", "is damaged, or another version of the tools wrote it", "run without --resume, or resume with that version");
         if (size) std::memcpy(data, bytes_.data(), size);
         bytes_ = bytes_.subspan(size);
     }
