@@ -6,6 +6,7 @@
 #include "core/parallel.h"
 #include "core/text.h"
 #include "dem/detail/impl.h"
+#include "dem/detail/sphere_motion.h"
 
 namespace coral::dem {
 
@@ -113,7 +114,7 @@ void World::Impl::check_step(double dt) const
 }
 
 // Kick of one body over dt; the spin of a body with nodes is left for the caller to renew. Returns the energy that its added mass takes up.
-// Number by number, here and in drift_bodies: vectors that are copied in a piece of two and one of one stall whoever reads them next.
+// Number by number, here and in drift_body: vectors that are copied in a piece of two and one of one stall whoever reads them next.
 inline double World::Impl::kick_body(std::size_t i, double dt, const Vec3& g_dt)
 {
     const bool heavier = i < added_mass.size() && added_mass[i] != Vec3::Zero();
@@ -131,12 +132,20 @@ void World::Impl::kick(double dt)
 {
     const Vec3 g_dt = options.gravity * dt;
     external_work -= parallel_sum(x.size(), body_grain, 0.0, [&](std::size_t first, std::size_t last) {
+        const detail::SphereMotion groups(*this, 2.0 * dt, options.gravity);
         double taken = 0.0;
-        for (std::size_t i = first; i < last; ++i)
+        for (std::size_t i = first; i < last;) {
+            if (i + groups.count <= last && groups.plain(i)) {
+                groups.kick(i);
+                i += groups.count;
+                continue;
+            }
             if (inverse_mass[i] > 0.0) {
                 taken += kick_body(i, dt, g_dt);
                 if (has_nodes[i]) update_spin(i);
             }
+            ++i;
+        }
         return taken;
     });
 }
@@ -169,48 +178,59 @@ World::Impl::Worn World::Impl::kick_and_drift(double dt)
 
 World::Impl::Drift World::Impl::drift_bodies(std::size_t first, std::size_t last, double dt)
 {
-    const Vec3 half_g = 0.5 * dt * options.gravity;
     Drift sum;
-    double farthest2 = 0.0;
-    for (std::size_t i = first; i < last; ++i) {
-        if (!in[i]) continue;
-        if (motion[i] != Motion::free) {
-            v_end[i] = v[i];
-            if (motion[i] == Motion::fixed) continue;
+    detail::SphereMotion groups(*this, dt, options.gravity);
+    for (std::size_t i = first; i < last;) {
+        if (i + groups.count <= last && groups.plain(i)) {
+            groups.drift(i);
+            i += groups.count;
         } else {
-            for (int k = 0; k < 3; ++k) v_end[i][k] = -v[i][k];
-            sum.external_work -= kick_body(i, 0.5 * dt, half_g);
-            for (int k = 0; k < 3; ++k) v_end[i][k] += 2.0 * v[i][k];
+            drift_body(i++, dt, sum);
         }
-        double way2 = 0.0, speed2 = 0.0, fall = 0.0;
-        for (int k = 0; k < 3; ++k) {
-            const double way = dt * v[i][k], now = x[i][k] + way, from = now - x_reference[i][k];
-            x[i][k] = now;
-            way2 += from * from;
-            speed2 += v[i][k] * v[i][k] + w[i][k] * w[i][k];
-            fall += options.gravity[k] * way;
-        }
-        sum.finite += speed2;
-        moved2[i] = way2;
-        farthest2 = std::max(farthest2, way2);
-        Vec3 turn = dt * w[i];
-        if (has_nodes[i]) {
-            turn_grid(i, dt);
-            turn = 0.5 * dt * (w_before[i] + w[i]);
-            if (mixed) {
-                grid_drift[i] = std::sqrt(way2) + turn_between(q[i], q_reference[i]) * radius[i];
-                sum.farthest = std::max(sum.farthest, grid_drift[i]);
-            }
-            sum.node_farthest = std::max(sum.node_farthest, note_way(i));
-        } else {
-            turn_sphere(q[i], turn);
-        }
-        if (motion[i] != Motion::free) continue;
-        sum.gravity_work += mass[i] * fall;
-        if (any_external) sum.external_work += dt * external_force[i].dot(v[i]) + external_torque[i].dot(turn);
     }
-    sum.farthest = std::max(sum.farthest, std::sqrt(farthest2));
+    sum.gravity_work += groups.gravity_work();
+    sum.finite += groups.finite();
+    sum.farthest = std::max(sum.farthest, std::sqrt(groups.farthest2()));
     return sum;
+}
+
+void World::Impl::drift_body(std::size_t i, double dt, Drift& sum)
+{
+    if (!in[i]) return;
+    if (motion[i] != Motion::free) {
+        v_end[i] = v[i];
+        if (motion[i] == Motion::fixed) return;
+    } else {
+        for (int k = 0; k < 3; ++k) v_end[i][k] = -v[i][k];
+        sum.external_work -= kick_body(i, 0.5 * dt, 0.5 * dt * options.gravity);
+        for (int k = 0; k < 3; ++k) v_end[i][k] += 2.0 * v[i][k];
+    }
+    double way2 = 0.0, speed2 = 0.0, fall = 0.0;
+    for (int k = 0; k < 3; ++k) {
+        const double way = dt * v[i][k], now = x[i][k] + way, from = now - x_reference[i][k];
+        x[i][k] = now;
+        way2 += from * from;
+        speed2 += v[i][k] * v[i][k] + w[i][k] * w[i][k];
+        fall += options.gravity[k] * way;
+    }
+    sum.finite += speed2;
+    moved2[i] = way2;
+    if (way2 > sum.farthest * sum.farthest) sum.farthest = std::sqrt(way2);
+    Vec3 turn = dt * w[i];
+    if (has_nodes[i]) {
+        turn_grid(i, dt);
+        turn = 0.5 * dt * (w_before[i] + w[i]);
+        if (mixed) {
+            grid_drift[i] = std::sqrt(way2) + turn_between(q[i], q_reference[i]) * radius[i];
+            sum.farthest = std::max(sum.farthest, grid_drift[i]);
+        }
+        sum.node_farthest = std::max(sum.node_farthest, note_way(i));
+    } else {
+        turn_sphere(q[i], turn);
+    }
+    if (motion[i] != Motion::free) return;
+    sum.gravity_work += mass[i] * fall;
+    if (any_external) sum.external_work += dt * external_force[i].dot(v[i]) + external_torque[i].dot(turn);
 }
 
 // Turns a body with nodes; its spin before (after the kick) and after go to w_before and w.

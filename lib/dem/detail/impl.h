@@ -371,6 +371,7 @@ struct World::Impl {
         }
     };
     Drift drift_bodies(std::size_t first, std::size_t last, double dt);
+    void drift_body(std::size_t i, double dt, Drift& sum);
     void turn_grid(std::size_t i, double dt);
     void correct_crossings();
     void check_numbers() const;
