@@ -150,8 +150,8 @@ double overlap_before(const WallData& wall, const Vec3& x, const Vec3& way, cons
 void World::Impl::sphere_loop(double dt)
 {
     SphereList& l = spheres;
-    parallel_blocks(l.rows.size(), row_grain, [&](std::size_t first, std::size_t last) {
-        const std::size_t block = first / row_grain;
+    parallel_blocks(l.block_count(), 1, [&](std::size_t block, std::size_t) {
+        const std::size_t first = std::size_t(l.block[block]), last = std::size_t(l.block[block + 1]);
         LoopSums s;
         LaneSums sums_of_lanes;
         std::vector<Crossing>& crossing = crossings[block];

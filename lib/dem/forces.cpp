@@ -86,8 +86,9 @@ void World::Impl::sum_forces(std::size_t first, std::size_t last)
 {
     RangeSums range(*this, first, last);
     for (std::size_t block = 0; block < out_count[0].size(); ++block) {
-        const PointContact* c = spheres.out.data() + spheres.row[block * row_grain];
+        const PointContact* c = spheres.out_of(block);
         const PointContact* const end = c + out_count[0][block];
+        if (c < end && std::size_t(c->a) >= last) break;  // from here on all numbers are higher
         while (c < end) c = range.add_row(c, end);
     }
     for (std::size_t block = 0; block < out_count[1].size(); ++block)

@@ -219,7 +219,7 @@ void World::Impl::make_lists()
 void World::Impl::make_blocks()
 {
     const auto blocks = [](std::size_t n, std::size_t grain) { return (n + grain - 1) / grain; };
-    out_count[0].assign(blocks(spheres.rows.size(), row_grain), 0);
+    out_count[0].assign(spheres.block_count(), 0);
     out_count[1].assign(blocks(sphere_walls.body.size(), entry_grain), 0);
     out_count[2].assign(blocks(sphere_grids.sphere.size(), grid_grain), 0);
     out_count[3].assign(blocks(nodes.slave.size(), node_grain), 0);

@@ -36,7 +36,7 @@ template <class Visit>
 void for_each_contact(const World::Impl& m, const Visit& visit)
 {
     for (std::size_t block = 0; block < m.out_count[0].size(); ++block)
-        for (std::int32_t k = 0; k < m.out_count[0][block]; ++k) visit(m.spheres.out[std::size_t(m.spheres.row[block * row_grain] + k)]);
+        for (std::int32_t k = 0; k < m.out_count[0][block]; ++k) visit(m.spheres.out_of(block)[k]);
     for (std::size_t block = 0; block < m.out_count[1].size(); ++block)
         for (std::int32_t k = 0; k < m.out_count[1][block]; ++k) visit(m.sphere_walls.out[block * entry_grain + std::size_t(k)]);
     for (std::size_t block = 0; block < m.out_count[2].size(); ++block)

@@ -85,6 +85,9 @@ struct Crossing {
     Index press = -1;           ///< of the list of spheres and grids, likewise
 };
 
+// Large enough that a small world runs in one block, without threads.
+constexpr std::size_t body_grain = 1024, pair_grain = 1024, entry_grain = 2048, grid_grain = 512, node_grain = 16;
+
 /// Half list of sphere pairs in compressed rows: partners of sphere i are other[row[i]..row[i+1]), ascending.
 struct SphereList {
     std::vector<Index> row, other;
@@ -93,8 +96,18 @@ struct SphereList {
     std::vector<double> root_mass;    ///< sqrt(m*)
     std::vector<PointContact> out;    ///< who touches, block by block
     std::vector<Index> rows;          ///< spheres with partners
+    std::vector<Index> block{0};      ///< first row of each block of the loop, and the end: about pair_grain pairs each, since low numbers have most of them
+    std::size_t block_count() const { return block.size() - 1; }
+    PointContact* out_of(std::size_t b) { return out.data() + row[std::size_t(block[b])]; }
+    const PointContact* out_of(std::size_t b) const { return out.data() + row[std::size_t(block[b])]; }
     /// Of what the loop writes, for the entries that are there.
-    void make_room() { out.resize(other.size()); }
+    void make_room()
+    {
+        out.resize(other.size());
+        block.assign(1, 0);
+        for (std::size_t r = 0; r < rows.size(); ++r)
+            if (std::size_t(row[r + 1] - row[std::size_t(block.back())]) >= pair_grain || r + 1 == rows.size()) block.push_back(Index(r + 1));
+    }
 };
 
 struct SphereWallList {
@@ -227,8 +240,6 @@ struct NodeList {
     double slack() const { return 4.0 * steepest * hop(); }
 };
 
-// Large enough that a small world runs in one block, without threads.
-constexpr std::size_t body_grain = 1024, row_grain = 1024, entry_grain = 2048, grid_grain = 512, node_grain = 16;
 
 /// Angle between two orientations, or a little less [rad]: |q - q'| is half of it for small ones, and either sign of q is the same.
 inline double turn_between(const Quat& a, const Quat& b)
