@@ -1,6 +1,7 @@
 // Contact loops of spheres against spheres and walls, in closed form. A first pass finds who touches, a second takes them a register full at a time.
 // Each block of the loop writes who touches into its own part of `out`; sums are taken later, in order.
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include "core/parallel.h"
@@ -158,24 +159,34 @@ void World::Impl::sphere_loop(double dt)
         const Index from = l.row[first];
         PointContact* const begin = l.out.data() + from;
         PointContact* touching = begin;
-        for (std::size_t r = first; r < last; ++r) {
-            const std::size_t i = std::size_t(l.rows[r]);
-            const Vec3 xi = x[i];
-            const double ri = radius[i];
-            for (Index k = l.row[r]; k < l.row[r + 1]; ++k) {
-                const std::size_t j = std::size_t(l.other[k]);
-                const double reach = ri + radius[j], d2 = periodic(xi - x[j]).squaredNorm();
-                if (d2 < reach * reach) {
-                    *touching++ = {Index(i), Index(j), k};
-                } else if (l.touch[k] != 0) {
-                    PointMemory& memory = l.memory[k];
-                    const Vec3 d = periodic(xi - x[j]), n = d / d.norm();
-                    const Vec3 spin = (ri - 0.5 * memory.overlap) * w[i] + (radius[j] - 0.5 * memory.overlap) * w[j];
-                    open_contact({Index(i), Index(j), law(material[i], material[j]), v[i] - v[j], spin, n, reach - d.norm(), (v_end[j] - v_end[i]).dot(n),
-                                  l.root_mass[k]},
-                                 memory, l.touch[k], true, options.overlap_cap * std::min(ri, radius[j]), dt, crossing, s);
-                }
+        const auto sphere_opens = [&](std::size_t k) {
+            const std::size_t i = std::size_t(l.one[k]), j = std::size_t(l.other[k]);
+            PointMemory& memory = l.memory[k];
+            const Vec3 d = periodic(x[i] - x[j]), n = d / d.norm();
+            const Vec3 spin = (radius[i] - 0.5 * memory.overlap) * w[i] + (radius[j] - 0.5 * memory.overlap) * w[j];
+            open_contact({Index(i), Index(j), law(material[i], material[j]), v[i] - v[j], spin, n, radius[i] + radius[j] - d.norm(),
+                          (v_end[j] - v_end[i]).dot(n), l.root_mass[k]},
+                         memory, l.touch[k], true, options.overlap_cap * std::min(radius[i], radius[j]), dt, crossing, s);
+        };
+        const std::size_t end = std::size_t(l.row[last]);
+        for (std::size_t k = std::size_t(from); k < end; k += lane_count) {
+            const int count = int(std::min(end - k, std::size_t(lane_count)));
+            const Index *one = &l.one[k], *other = &l.other[k];
+            Index filled[2][lane_count];
+            if (count < lane_count) {
+                for (int lane = 0; lane < lane_count; ++lane) filled[0][lane] = one[lane < count ? lane : 0], filled[1][lane] = other[lane < count ? lane : 0];
+                one = filled[0], other = filled[1];
             }
+            const Vec3Lanes d = periodic(detail::wide_vectors([&](int lane) -> const Vec3& { return x[std::size_t(one[lane])]; }) -
+                                         detail::wide_vectors([&](int lane) -> const Vec3& { return x[std::size_t(other[lane])]; }));
+            const Lanes reach = detail::lanes_from<Lanes>([&](int lane) { return radius[std::size_t(one[lane])] + radius[std::size_t(other[lane])]; });
+            const unsigned present = (1u << count) - 1u, near = present & detail::bits(detail::dot(d, d) < reach * reach);
+            for (unsigned left = near; left != 0; left &= left - 1) {
+                const int lane = std::countr_zero(left);
+                *touching++ = {one[lane], other[lane], Index(k) + lane};
+            }
+            for (unsigned left = present & ~near; left != 0; left &= left - 1)
+                if (const std::size_t pair = k + std::size_t(std::countr_zero(left)); l.touch[pair] != 0) sphere_opens(pair);
         }
 
         for (const PointContact* at = begin; at < touching; at += lane_count) {

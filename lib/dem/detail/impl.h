@@ -91,6 +91,7 @@ constexpr std::size_t body_grain = 1024, pair_grain = 1024, entry_grain = 2048, 
 /// Half list of sphere pairs in compressed rows: partners of sphere i are other[row[i]..row[i+1]), ascending.
 struct SphereList {
     std::vector<Index> row, other;
+    std::vector<Index> one;           ///< the sphere of each pair's row
     std::vector<PointMemory> memory;
     std::vector<std::uint8_t> touch;  ///< 0 apart, 1 touching, 2 touching without force (clamped)
     std::vector<double> root_mass;    ///< sqrt(m*)
@@ -104,9 +105,12 @@ struct SphereList {
     void make_room()
     {
         out.resize(other.size());
+        one.resize(other.size());
         block.assign(1, 0);
-        for (std::size_t r = 0; r < rows.size(); ++r)
+        for (std::size_t r = 0; r < rows.size(); ++r) {
+            std::fill(one.begin() + row[r], one.begin() + row[r + 1], rows[r]);
             if (std::size_t(row[r + 1] - row[std::size_t(block.back())]) >= pair_grain || r + 1 == rows.size()) block.push_back(Index(r + 1));
+        }
     }
 };
 

@@ -97,6 +97,18 @@ template <class Mask>
     return some != 0;
 }
 
+/// What a comparison gives, a bit a lane.
+template <class Mask>
+[[gnu::always_inline]] inline unsigned bits(Mask mask)
+{
+#ifdef CORAL_AVX512
+    if constexpr (sizeof(Mask) == 64) return _mm512_movepi64_mask(__m512i(mask));
+#endif
+    unsigned all_bits = 0;
+    for (int k = 0; k < int(sizeof(Mask) / sizeof(long long)); ++k) all_bits |= unsigned(mask[k] & 1) << k;
+    return all_bits;
+}
+
 template <class V>
 struct VectorsOf {
     V x, y, z;
