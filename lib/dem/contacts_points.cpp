@@ -81,7 +81,7 @@ template <class LawOf>
 /// Sums over the contacts of a block, lane by lane: added up at its end.
 struct LaneSums {
     Lanes stored_normal = all<Lanes>(0.0), stored_tangential = stored_normal, friction = stored_normal, damping = stored_normal;
-    Lanes depth = stored_normal, deep = stored_normal;
+    Lanes deep = stored_normal, deepest = stored_normal, deepest_smaller = all<Lanes>(1.0);  ///< deepest: overlap of the deepest over its radius
     void add(const Members& m, const PointGroup& g, const PointResult& r, double cap)
     {
         const Lanes zero = all<Lanes>(0.0), number = detail::lanes_from<Lanes>([](int k) { return k; });
@@ -90,9 +90,10 @@ struct LaneSums {
         stored_tangential += there * r.stored_tangential;
         friction += there * r.friction;
         damping += there * r.damping;
-        const Lanes relative = g.overlap / g.smaller;
-        depth = detail::max(depth, there * relative);
-        deep += relative > all<Lanes>(cap) ? there : zero;
+        const auto deeper = there * g.overlap * deepest_smaller > deepest * g.smaller;
+        deepest = deeper ? g.overlap : deepest;
+        deepest_smaller = deeper ? g.smaller : deepest_smaller;
+        deep += g.overlap > cap * g.smaller ? there : zero;
     }
     void add_to(LoopSums& s) const
     {
@@ -102,7 +103,7 @@ struct LaneSums {
         s.friction += sum(friction);
         s.damping += sum(damping);
         s.deep += std::int64_t(sum(deep));
-        for (int k = 0; k < lane_count; ++k) s.max_overlap = std::max(s.max_overlap, depth[k]);
+        for (int k = 0; k < lane_count; ++k) s.max_overlap = std::max(s.max_overlap, deepest[k] / deepest_smaller[k]);
     }
 };
 

@@ -58,16 +58,19 @@ struct PointResult {
     s = (turned2 > zero ? sqrt(length2 / (turned2 > zero ? turned2 : one)) : zero) * s;
     s = s + half_dt * slide;
 
-    // A slipping spring keeps the length of the limit, and the dashpot beside it is off.
+    // A slipping spring keeps the length of the limit, and the dashpot beside it is off; one that does not slip may pull too hard with its dashpot.
     const V bound = g.friction * r.force, limit = g.give * r.force, stretched2 = dot(s, s);
     const auto slips = stretched2 > limit * limit;
-    if (any(slips)) s = (slips ? limit / sqrt(slips ? stretched2 : one) : one) * s;
+    WideVec3Lanes tangential = (-g.kt) * s + (slips ? zero : -g.ct * g.root_mass) * slide;
+    const V size2 = dot(tangential, tangential);
+    const auto over = ~slips & (size2 > bound * bound);
+    if (any(slips | over)) {
+        const V shrink = (slips ? limit : bound) / sqrt(slips ? stretched2 : over ? size2 : one);
+        s = (slips ? shrink : one) * s;
+        tangential = (slips | over ? shrink : one) * tangential;
+    }
     r.spring = s;
     const WideVec3Lanes pull = (-g.kt) * s;
-    WideVec3Lanes tangential = pull + (slips ? zero : -g.ct * g.root_mass) * slide;
-    const V size2 = dot(tangential, tangential);
-    const auto over = size2 > bound * bound;
-    if (any(over)) tangential = (over ? bound / sqrt(over ? size2 : one) : one) * tangential;
     r.total = r.force * g.normal + tangential;
 
     const WideVec3Lanes drag = (r.force - elastic) * g.normal + (tangential - pull);
