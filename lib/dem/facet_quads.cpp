@@ -4,9 +4,6 @@
 #include <cmath>
 #include <numbers>
 
-// Lanes are passed by value inline only, as in lanes.h.
-#pragma GCC diagnostic ignored "-Wpsabi"
-
 namespace coral::dem::detail {
 
 namespace {
