@@ -21,10 +21,10 @@ public:
     {
     }
 
-    /// Whether `count` bodies from i on are of that sort.
+    /// Whether `count` bodies from i on are of that sort. In registers of four it costs more to sort the numbers than is saved.
     bool plain(std::size_t i) const
     {
-        if (!bare_ || i + count > w_.x.size()) return false;
+        if (wide_lane_count < 8 || !bare_ || i + count > w_.x.size()) return false;
         bool all_plain = true;
         for (std::size_t k = i; k < i + count; ++k)
             all_plain = all_plain && w_.in[k] && w_.motion[k] == Motion::free && !w_.has_nodes[k] && (k >= w_.added_mass.size() || w_.added_mass[k] == Vec3::Zero());
