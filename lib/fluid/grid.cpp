@@ -1,5 +1,7 @@
 #include "fluid/grid.h"
 
+#include <sys/mman.h>
+
 #include <atomic>
 #include <cstring>
 #include <string>
@@ -63,6 +65,10 @@ namespace {
 constexpr std::size_t line = 64, large = 65536;
 // A page has 64 lines: arrays begin on sixteen of them in turn, no two of which are alike.
 constexpr std::size_t places = 16, lines_apart = 5;
+// Sweeps across planes touch a page every few kilobytes: fields lie in pages of 2 MB where the system has them on request.
+constexpr std::size_t huge_page = std::size_t{1} << 21;
+
+std::align_val_t alignment_of(std::size_t bytes) { return std::align_val_t{bytes < huge_page ? line : huge_page}; }
 }
 
 void* allocate_staggered(std::size_t bytes)
@@ -70,7 +76,12 @@ void* allocate_staggered(std::size_t bytes)
     if (bytes < large) return ::operator new (bytes, std::align_val_t{line});
     static std::atomic<std::size_t> count{0};
     const std::size_t shift = line + lines_apart * line * (count++ % places);
-    auto* const memory = static_cast<std::byte*>(::operator new (bytes + shift, std::align_val_t{line}));
+    const bool huge = bytes >= huge_page;
+    const std::size_t whole = huge ? (bytes + shift + huge_page - 1) / huge_page * huge_page : bytes + shift;
+    auto* const memory = static_cast<std::byte*>(::operator new (whole, alignment_of(bytes)));
+#ifdef MADV_HUGEPAGE
+    if (huge) madvise(memory, whole, MADV_HUGEPAGE);  // a wish: what becomes of it does not matter
+#endif
     std::byte* const array = memory + shift;
     std::memcpy(array - sizeof memory, &memory, sizeof memory);  // for free_staggered
     return array;
@@ -78,9 +89,10 @@ void* allocate_staggered(std::size_t bytes)
 
 void free_staggered(void* array, std::size_t bytes)
 {
-    void* memory = array;
-    if (bytes >= large) std::memcpy(&memory, static_cast<std::byte*>(array) - sizeof memory, sizeof memory);
-    ::operator delete (memory, std::align_val_t{line});
+    if (bytes < large) return ::operator delete (array, std::align_val_t{line});
+    void* memory = nullptr;
+    std::memcpy(&memory, static_cast<std::byte*>(array) - sizeof memory, sizeof memory);
+    ::operator delete (memory, alignment_of(bytes));
 }
 
 }  // namespace detail
