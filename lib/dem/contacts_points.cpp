@@ -147,156 +147,207 @@ double overlap_before(const WallData& wall, const Vec3& x, const Vec3& way, cons
     return overlap + wall.distance_and_gradient(x, gradient) - wall.distance_and_gradient(x - way, gradient);
 }
 
+/// One block of a loop: what its passes share.
+struct Block {
+    World::Impl& world;
+    double dt;
+    std::vector<Crossing>& crossing;
+    LoopSums sums = {};
+    LaneSums of_lanes = {};
+
+    void close(const PointContact* begin, const PointContact* end, std::size_t tests)
+    {
+        of_lanes.add_to(sums);
+        sums.tests = std::int64_t(tests);
+        sums.touching = end - begin;
+    }
+};
+
+[[gnu::always_inline]] inline Vec3Lanes take(const Members& m, const std::vector<Vec3>& field, Index PointContact::*of)
+{
+    return m.vectors([&](const PointContact& c) -> const Vec3& { return field[std::size_t(c.*of)]; });
+}
+[[gnu::always_inline]] inline Lanes take(const Members& m, const std::vector<double>& field, Index PointContact::*of)
+{
+    return m.numbers([&](const PointContact& c) { return field[std::size_t(c.*of)]; });
+}
+
+void open_spheres(Block& block, std::size_t k)
+{
+    World::Impl& w = block.world;
+    SphereList& l = w.spheres;
+    const std::size_t i = std::size_t(l.one[k]), j = std::size_t(l.other[k]);
+    const Vec3 d = w.periodic(w.x[i] - w.x[j]), n = d / d.norm();
+    const double half = 0.5 * l.memory[k].overlap, cap = w.options.overlap_cap * std::min(w.radius[i], w.radius[j]);
+    const Opening opening{Index(i),
+                          Index(j),
+                          w.law(w.material[i], w.material[j]),
+                          w.v[i] - w.v[j],
+                          (w.radius[i] - half) * w.w[i] + (w.radius[j] - half) * w.w[j],
+                          n,
+                          w.radius[i] + w.radius[j] - d.norm(),
+                          (w.v_end[j] - w.v_end[i]).dot(n),
+                          l.root_mass[k]};
+    open_contact(opening, l.memory[k], l.touch[k], true, cap, block.dt, block.crossing, block.sums);
+}
+
+/// Pairs first..last that touch, to `touching`. \returns their end
+PointContact* find_spheres(Block& block, std::size_t first, std::size_t last, PointContact* touching)
+{
+    const World::Impl& w = block.world;
+    const SphereList& l = w.spheres;
+    for (std::size_t k = first; k < last; k += lane_count) {
+        const int count = int(std::min(last - k, std::size_t(lane_count)));
+        const Index *one = &l.one[k], *other = &l.other[k];
+        Index filled[2][lane_count];
+        if (count < lane_count) {
+            for (int lane = 0; lane < lane_count; ++lane) filled[0][lane] = one[lane < count ? lane : 0], filled[1][lane] = other[lane < count ? lane : 0];
+            one = filled[0], other = filled[1];
+        }
+        const Vec3Lanes d = w.periodic(detail::wide_vectors([&](int lane) -> const Vec3& { return w.x[std::size_t(one[lane])]; }) -
+                                       detail::wide_vectors([&](int lane) -> const Vec3& { return w.x[std::size_t(other[lane])]; }));
+        const Lanes reach = detail::lanes_from<Lanes>([&](int lane) { return w.radius[std::size_t(one[lane])] + w.radius[std::size_t(other[lane])]; });
+        const unsigned present = (1u << count) - 1u, near = present & detail::bits(detail::dot(d, d) < reach * reach);
+        for (unsigned left = near; left != 0; left &= left - 1) {
+            const int lane = std::countr_zero(left);
+            *touching++ = {one[lane], other[lane], Index(k) + lane};
+        }
+        for (unsigned left = present & ~near; left != 0; left &= left - 1)
+            if (const std::size_t pair = k + std::size_t(std::countr_zero(left)); l.touch[pair] != 0) open_spheres(block, pair);
+    }
+    return touching;
+}
+
+void press_spheres(Block& block, const PointContact* begin, const PointContact* end)
+{
+    World::Impl& w = block.world;
+    SphereList& l = w.spheres;
+    const double cap = w.options.overlap_cap, dt = block.dt;
+    const Lanes none = all<Lanes>(0.0), unit = all<Lanes>(1.0);
+    for (const PointContact* at = begin; at < end; at += lane_count) {
+        const Members m(at, end - at);
+        const auto law_of = [&](const PointContact& c) -> const PairLaw& { return w.law(w.material[std::size_t(c.a)], w.material[std::size_t(c.b)]); };
+        PointGroup g;
+        take_law(m, w.laws.size() == 1, law_of, g);
+        take_memory(m, l.memory, g);
+        g.relative = take(m, w.v, &PointContact::a) - take(m, w.v, &PointContact::b);
+        g.spin_a = take(m, w.w, &PointContact::a);
+        g.spin_b = take(m, w.w, &PointContact::b);
+        g.radius_a = take(m, w.radius, &PointContact::a);
+        g.radius_b = take(m, w.radius, &PointContact::b);
+        g.smaller = detail::min(g.radius_a, g.radius_b);
+        g.share = all<Lanes>(0.5);
+        g.root_mass = take(m, l.root_mass, &PointContact::entry);
+        const Vec3Lanes d = w.periodic(take(m, w.x, &PointContact::a) - take(m, w.x, &PointContact::b));
+        const Lanes length = detail::sqrt(detail::dot(d, d)), inverse = length > none ? unit / (length > none ? length : unit) : none;
+        g.normal = inverse * d;
+        g.normal.z = length > none ? g.normal.z : unit;
+        g.overlap = g.radius_a + g.radius_b - length;
+        g.approach = detail::dot(take(m, w.v_end, &PointContact::b) - take(m, w.v_end, &PointContact::a), g.normal);
+        const PointResult r = detail::point_law(g, cap, dt);
+        for (int k = 0; k < m.count; ++k)
+            if (l.touch[m[k].entry] == 0 && dt > 0.0) {
+                const Vec3 past = detail::lane(d, k) - dt * detail::lane(g.relative, k);
+                detail::add_crossing(block.crossing, m[k].a, m[k].b, law_of(m[k]), g.radius_a[k] + g.radius_b[k] - past.norm(), g.overlap[k],
+                                     g.approach[k], g.root_mass[k], dt, detail::lane(g.normal, k), block.sums);
+            }
+        put_back(m, g, r, l.memory, l.touch);
+        block.of_lanes.add(m, g, r, cap);
+    }
+}
+
+/// The same of spheres at walls, whose normals and overlaps stay in the list.
+PointContact* find_at_walls(Block& block, std::size_t first, std::size_t last, PointContact* touching)
+{
+    World::Impl& w = block.world;
+    SphereWallList& l = w.sphere_walls;
+    for (std::size_t k = first; k < last; ++k) {
+        const std::size_t i = std::size_t(l.body[k]);
+        const WallData& wall = w.walls[std::size_t(l.wall[k])];
+        Vec3 n = wall.normal;
+        double distance = 0.0;
+        bool facing = true;
+        if (wall.kind == WallData::Kind::plane) distance = n.dot(w.x[i] - wall.point);
+        else if (wall.kind == WallData::Kind::plate) facing = wall.plate.feature(l.feature[k], w.x[i], distance, n);
+        else distance = wall.distance_and_gradient(w.x[i], n);
+        const double overlap = facing ? w.radius[i] - distance : -1.0;
+        if (overlap > 0.0) {
+            l.near_normal[k] = n;
+            l.near_overlap[k] = overlap;
+            *touching++ = {Index(i), -1 - l.wall[k], Index(k)};
+        } else if (l.touch[k] != 0) {
+            open_contact({Index(i), -1 - l.wall[k], w.law(w.material[i], wall.material), w.v[i] - wall.velocity, (w.radius[i] - l.memory[k].overlap) * w.w[i],
+                          n, overlap, (wall.velocity - w.v_end[i]).dot(n), std::sqrt(w.mass[i])},
+                         l.memory[k], l.touch[k], facing, w.options.overlap_cap * w.radius[i], block.dt, block.crossing, block.sums);
+        }
+    }
+    return touching;
+}
+
+void press_at_walls(Block& block, const PointContact* begin, const PointContact* end)
+{
+    World::Impl& w = block.world;
+    SphereWallList& l = w.sphere_walls;
+    const double cap = w.options.overlap_cap, dt = block.dt;
+    const Lanes none = all<Lanes>(0.0);
+    for (const PointContact* at = begin; at < end; at += lane_count) {
+        const Members m(at, end - at);
+        const auto wall_of = [&](const PointContact& c) -> const WallData& { return w.walls[std::size_t(-1 - c.b)]; };
+        const auto law_of = [&](const PointContact& c) -> const PairLaw& { return w.law(w.material[std::size_t(c.a)], wall_of(c).material); };
+        const Vec3Lanes wall_velocity = m.vectors([&](const PointContact& c) -> const Vec3& { return wall_of(c).velocity; });
+        PointGroup g;
+        take_law(m, w.laws.size() == 1, law_of, g);
+        take_memory(m, l.memory, g);
+        g.relative = take(m, w.v, &PointContact::a) - wall_velocity;
+        g.spin_a = take(m, w.w, &PointContact::a);
+        g.spin_b = {none, none, none};
+        g.radius_a = g.smaller = take(m, w.radius, &PointContact::a);
+        g.radius_b = none;
+        g.share = all<Lanes>(1.0);
+        g.root_mass = detail::sqrt(take(m, w.mass, &PointContact::a));
+        g.normal = take(m, l.near_normal, &PointContact::entry);
+        g.overlap = take(m, l.near_overlap, &PointContact::entry);
+        g.approach = detail::dot(wall_velocity - take(m, w.v_end, &PointContact::a), g.normal);
+        const PointResult r = detail::point_law(g, cap, dt);
+        for (int k = 0; k < m.count; ++k)
+            if (l.touch[m[k].entry] == 0 && dt > 0.0) {
+                const Vec3 n = detail::lane(g.normal, k), way = dt * detail::lane(g.relative, k);
+                const double past = overlap_before(wall_of(m[k]), w.x[std::size_t(m[k].a)], way, n, g.overlap[k]);
+                detail::add_crossing(block.crossing, m[k].a, m[k].b, law_of(m[k]), past, g.overlap[k], g.approach[k], g.root_mass[k], dt, n, block.sums);
+            }
+        put_back(m, g, r, l.memory, l.touch);
+        block.of_lanes.add(m, g, r, cap);
+    }
+}
+
 }  // namespace
 
 void World::Impl::sphere_loop(double dt)
 {
-    SphereList& l = spheres;
-    parallel_blocks(l.block_count(), 1, [&](std::size_t block, std::size_t) {
-        const std::size_t first = std::size_t(l.block[block]), last = std::size_t(l.block[block + 1]);
-        LoopSums s;
-        LaneSums sums_of_lanes;
-        std::vector<Crossing>& crossing = crossings[block];
-        const Index from = l.row[first];
-        PointContact* const begin = l.out.data() + from;
-        PointContact* touching = begin;
-        const auto sphere_opens = [&](std::size_t k) {
-            const std::size_t i = std::size_t(l.one[k]), j = std::size_t(l.other[k]);
-            PointMemory& memory = l.memory[k];
-            const Vec3 d = periodic(x[i] - x[j]), n = d / d.norm();
-            const Vec3 spin = (radius[i] - 0.5 * memory.overlap) * w[i] + (radius[j] - 0.5 * memory.overlap) * w[j];
-            open_contact({Index(i), Index(j), law(material[i], material[j]), v[i] - v[j], spin, n, radius[i] + radius[j] - d.norm(),
-                          (v_end[j] - v_end[i]).dot(n), l.root_mass[k]},
-                         memory, l.touch[k], true, options.overlap_cap * std::min(radius[i], radius[j]), dt, crossing, s);
-        };
-        const std::size_t end = std::size_t(l.row[last]);
-        for (std::size_t k = std::size_t(from); k < end; k += lane_count) {
-            const int count = int(std::min(end - k, std::size_t(lane_count)));
-            const Index *one = &l.one[k], *other = &l.other[k];
-            Index filled[2][lane_count];
-            if (count < lane_count) {
-                for (int lane = 0; lane < lane_count; ++lane) filled[0][lane] = one[lane < count ? lane : 0], filled[1][lane] = other[lane < count ? lane : 0];
-                one = filled[0], other = filled[1];
-            }
-            const Vec3Lanes d = periodic(detail::wide_vectors([&](int lane) -> const Vec3& { return x[std::size_t(one[lane])]; }) -
-                                         detail::wide_vectors([&](int lane) -> const Vec3& { return x[std::size_t(other[lane])]; }));
-            const Lanes reach = detail::lanes_from<Lanes>([&](int lane) { return radius[std::size_t(one[lane])] + radius[std::size_t(other[lane])]; });
-            const unsigned present = (1u << count) - 1u, near = present & detail::bits(detail::dot(d, d) < reach * reach);
-            for (unsigned left = near; left != 0; left &= left - 1) {
-                const int lane = std::countr_zero(left);
-                *touching++ = {one[lane], other[lane], Index(k) + lane};
-            }
-            for (unsigned left = present & ~near; left != 0; left &= left - 1)
-                if (const std::size_t pair = k + std::size_t(std::countr_zero(left)); l.touch[pair] != 0) sphere_opens(pair);
-        }
-
-        for (const PointContact* at = begin; at < touching; at += lane_count) {
-            const Members m(at, touching - at);
-            const auto of_a = [&](const std::vector<Vec3>& field) { return m.vectors([&](const PointContact& c) -> const Vec3& { return field[std::size_t(c.a)]; }); };
-            const auto of_b = [&](const std::vector<Vec3>& field) { return m.vectors([&](const PointContact& c) -> const Vec3& { return field[std::size_t(c.b)]; }); };
-            const auto law_of = [&](const PointContact& c) -> const PairLaw& { return law(material[std::size_t(c.a)], material[std::size_t(c.b)]); };
-            PointGroup g;
-            take_law(m, laws.size() == 1, law_of, g);
-            take_memory(m, l.memory, g);
-            g.relative = of_a(v) - of_b(v);
-            g.spin_a = of_a(w);
-            g.spin_b = of_b(w);
-            g.radius_a = m.numbers([&](const PointContact& c) { return radius[std::size_t(c.a)]; });
-            g.radius_b = m.numbers([&](const PointContact& c) { return radius[std::size_t(c.b)]; });
-            g.smaller = detail::min(g.radius_a, g.radius_b);
-            g.share = all<Lanes>(0.5);
-            g.root_mass = m.numbers([&](const PointContact& c) { return l.root_mass[std::size_t(c.entry)]; });
-            const Vec3Lanes d = periodic(of_a(x) - of_b(x));
-            const Lanes length = detail::sqrt(detail::dot(d, d)), none = all<Lanes>(0.0), one = all<Lanes>(1.0);
-            const Lanes inverse = length > none ? one / (length > none ? length : one) : none;
-            g.normal = inverse * d;
-            g.normal.z = length > none ? g.normal.z : one;
-            g.overlap = g.radius_a + g.radius_b - length;
-            g.approach = detail::dot(of_b(v_end) - of_a(v_end), g.normal);
-            const PointResult r = detail::point_law(g, options.overlap_cap, dt);
-            for (int k = 0; k < m.count; ++k)
-                if (l.touch[m[k].entry] == 0 && dt > 0.0) {
-                    const Vec3 past = detail::lane(d, k) - dt * detail::lane(g.relative, k);
-                    detail::add_crossing(crossing, m[k].a, m[k].b, law_of(m[k]), g.radius_a[k] + g.radius_b[k] - past.norm(), g.overlap[k], g.approach[k],
-                                         g.root_mass[k], dt, detail::lane(g.normal, k), s);
-                }
-            put_back(m, g, r, l.memory, l.touch);
-            sums_of_lanes.add(m, g, r, options.overlap_cap);
-        }
-        sums_of_lanes.add_to(s);
-        s.tests = l.row[last] - from;
-        s.touching = touching - begin;
-        out_count[0][block] = std::int32_t(touching - begin);
-        block_sums[block] = s;
+    parallel_blocks(spheres.block_count(), 1, [&](std::size_t b, std::size_t) {
+        Block block{*this, dt, crossings[b]};
+        const std::size_t first = std::size_t(spheres.row[std::size_t(spheres.block[b])]), last = std::size_t(spheres.row[std::size_t(spheres.block[b + 1])]);
+        PointContact* const begin = spheres.out_of(b);
+        PointContact* const end = find_spheres(block, first, last, begin);
+        press_spheres(block, begin, end);
+        block.close(begin, end, last - first);
+        out_count[0][b] = std::int32_t(end - begin);
+        block_sums[b] = block.sums;
     });
 }
 
 void World::Impl::sphere_wall_loop(double dt)
 {
-    SphereWallList& l = sphere_walls;
     const std::size_t base = out_count[0].size();
-    parallel_blocks(l.body.size(), entry_grain, [&](std::size_t first, std::size_t last) {
-        const std::size_t block = first / entry_grain;
-        LoopSums s;
-        LaneSums sums_of_lanes;
-        std::vector<Crossing>& crossing = crossings[base + block];
-        PointContact* const begin = l.out.data() + first;
-        PointContact* touching = begin;
-        for (std::size_t k = first; k < last; ++k) {
-            const std::size_t i = std::size_t(l.body[k]);
-            const WallData& wall = walls[std::size_t(l.wall[k])];
-            Vec3 n = wall.normal;
-            double distance = 0.0;
-            bool facing = true;
-            if (wall.kind == WallData::Kind::plane) distance = n.dot(x[i] - wall.point);
-            else if (wall.kind == WallData::Kind::plate) facing = wall.plate.feature(l.feature[k], x[i], distance, n);
-            else distance = wall.distance_and_gradient(x[i], n);
-            const double overlap = facing ? radius[i] - distance : -1.0;
-            if (overlap > 0.0) {
-                l.near_normal[k] = n;
-                l.near_overlap[k] = overlap;
-                *touching++ = {Index(i), -1 - l.wall[k], Index(k)};
-            } else if (l.touch[k] != 0) {
-                open_contact({Index(i), -1 - l.wall[k], law(material[i], wall.material), v[i] - wall.velocity, (radius[i] - l.memory[k].overlap) * w[i], n,
-                              overlap, (wall.velocity - v_end[i]).dot(n), std::sqrt(mass[i])},
-                             l.memory[k], l.touch[k], facing, options.overlap_cap * radius[i], dt, crossing, s);
-            }
-        }
-
-        for (const PointContact* at = begin; at < touching; at += lane_count) {
-            const Members m(at, touching - at);
-            const auto wall_of = [&](const PointContact& c) -> const WallData& { return walls[std::size_t(-1 - c.b)]; };
-            const auto of_a = [&](const std::vector<Vec3>& field) { return m.vectors([&](const PointContact& c) -> const Vec3& { return field[std::size_t(c.a)]; }); };
-            const auto wall_velocity = m.vectors([&](const PointContact& c) -> const Vec3& { return wall_of(c).velocity; });
-            const auto law_of = [&](const PointContact& c) -> const PairLaw& { return law(material[std::size_t(c.a)], wall_of(c).material); };
-            PointGroup g;
-            take_law(m, laws.size() == 1, law_of, g);
-            take_memory(m, l.memory, g);
-            g.relative = of_a(v) - wall_velocity;
-            g.spin_a = of_a(w);
-            g.spin_b = {all<Lanes>(0.0), all<Lanes>(0.0), all<Lanes>(0.0)};
-            g.radius_a = g.smaller = m.numbers([&](const PointContact& c) { return radius[std::size_t(c.a)]; });
-            g.radius_b = all<Lanes>(0.0);
-            g.share = all<Lanes>(1.0);
-            g.root_mass = detail::sqrt(m.numbers([&](const PointContact& c) { return mass[std::size_t(c.a)]; }));
-            g.normal = m.vectors([&](const PointContact& c) -> const Vec3& { return l.near_normal[std::size_t(c.entry)]; });
-            g.overlap = m.numbers([&](const PointContact& c) { return l.near_overlap[std::size_t(c.entry)]; });
-            g.approach = detail::dot(wall_velocity - of_a(v_end), g.normal);
-            const PointResult r = detail::point_law(g, options.overlap_cap, dt);
-            for (int k = 0; k < m.count; ++k)
-                if (l.touch[m[k].entry] == 0 && dt > 0.0) {
-                    const Vec3 n = detail::lane(g.normal, k), way = dt * detail::lane(g.relative, k);
-                    const double past = overlap_before(wall_of(m[k]), x[std::size_t(m[k].a)], way, n, g.overlap[k]);
-                    detail::add_crossing(crossing, m[k].a, m[k].b, law_of(m[k]), past, g.overlap[k], g.approach[k], g.root_mass[k], dt, n, s);
-                }
-            put_back(m, g, r, l.memory, l.touch);
-            sums_of_lanes.add(m, g, r, options.overlap_cap);
-        }
-        sums_of_lanes.add_to(s);
-        s.tests = std::int64_t(last - first);
-        s.touching = touching - begin;
-        out_count[1][block] = std::int32_t(touching - begin);
-        block_sums[base + block] = s;
+    parallel_blocks(sphere_walls.body.size(), entry_grain, [&](std::size_t first, std::size_t last) {
+        const std::size_t b = first / entry_grain;
+        Block block{*this, dt, crossings[base + b]};
+        PointContact* const begin = sphere_walls.out.data() + first;
+        PointContact* const end = find_at_walls(block, first, last, begin);
+        press_at_walls(block, begin, end);
+        block.close(begin, end, last - first);
+        out_count[1][b] = std::int32_t(end - begin);
+        block_sums[base + b] = block.sums;
     });
 }
 
