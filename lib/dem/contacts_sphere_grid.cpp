@@ -182,12 +182,16 @@ bool World::Impl::press_on_walls(std::size_t k, double dt, GeneralForce& out, Lo
     Places places(slots);
     PressMemory now;
     Vec3 push = Vec3::Zero();
-    detail::QuadPress press;
-    for (std::size_t n = 0; n < pocket.quads.size(); ++n) {
-        const detail::FacetQuad& quad = pocket.quads[n];
-        if (quad.clearance >= r + moved) break;
-        if (n + fetched_quads < pocket.quads.size()) detail::prefetch(pocket.quads[n + fetched_quads]);
-        if (detail::press_on(quad, local, r, press)) places.add(press);
+    detail::QuadPress press[2];
+    const auto in_reach = [&](std::size_t n) { return n < pocket.quads.size() && pocket.quads[n].clearance < r + moved; };
+    for (std::size_t n = 0; in_reach(n); n += 2) {
+        for (std::size_t next = n + fetched_quads; next < std::min(n + fetched_quads + 2, pocket.quads.size()); ++next) detail::prefetch(pocket.quads[next]);
+        if (!in_reach(n + 1)) {
+            if (detail::press_on(pocket.quads[n], local, r, press[0])) places.add(press[0]);
+        } else if (detail::press_on(pocket.quads[n], pocket.quads[n + 1], local, r, press)) {
+            for (const detail::QuadPress& quad : press)
+                if (detail::any(quad.covered > detail::all(0.0))) places.add(quad);
+        }
     }
     for (int p = 0; p < places.count; ++p) {
         push += stiffness * places.force[p];

@@ -37,17 +37,21 @@ inline void prefetch(const FacetQuad& quad)
     for (std::size_t byte = 0; byte < sizeof quad; byte += 64) __builtin_prefetch(reinterpret_cast<const char*>(&quad) + byte);
 }
 
-/// Integrals over what a ball covers of each of four triangles.
-struct QuadPress {
-    Lanes covered;    ///< 1 or 0: whether any of the triangle is; without it the other values mean nothing
-    Vec3Lanes force;  ///< int (c - x)/R dA [m2]
-    Lanes size;       ///< of the force [m2]
-    Lanes energy;     ///< int (R^2 - |c - x|^2)/(2R) dA [m3]
+/// Integrals over what a ball covers of each triangle.
+template <class V>
+struct PressOf {
+    V covered;           ///< 1 or 0: whether any of the triangle is; without it the other values mean nothing
+    VectorsOf<V> force;  ///< int (c - x)/R dA [m2]
+    V size;              ///< of the force [m2]
+    V energy;            ///< int (R^2 - |c - x|^2)/(2R) dA [m3]
 };
+using QuadPress = PressOf<Lanes>;
 
 #pragma GCC diagnostic pop
 
 /// \returns whether the ball covers any part of any of them; `press` is set only then
 bool press_on(const FacetQuad& quad, const Eigen::Vector3d& centre, double radius, QuadPress& press);
+/// The same of two quads, side by side where registers are wide enough.
+bool press_on(const FacetQuad& one, const FacetQuad& other, const Eigen::Vector3d& centre, double radius, QuadPress (&press)[2]);
 
 }  // namespace coral::dem::detail

@@ -62,18 +62,19 @@ template <class V>
 
 /// Argument of re + i im, between -pi and pi, to two units in the last place: the rational form of Cephes (Moshier 1989) for the arc tangent
 /// below tan(3 pi/16), 45 degrees taken off above pi/8.
-[[gnu::always_inline]] inline Lanes argument(Lanes re, Lanes im)
+template <class V>
+[[gnu::always_inline]] inline V argument(V re, V im)
 {
-    const Lanes zero = all(0.0), x = max(re, -re), y = max(im, -im), low = min(x, y), high = max(x, y);
-    const auto steep = low > all(0.41421356237309503) * high;
-    const Lanes t = (steep ? low - high : low) / (steep ? low + high : high), z = t * t;
-    const Lanes p = (((all(-8.750608600031904122785e-1) * z - all(1.615753718733365076637e1)) * z - all(7.500855792314704667340e1)) * z -
-                     all(1.228866684490136173410e2)) * z - all(6.485021904942025371773e1);
-    const Lanes q = ((((z + all(2.485846490142306297962e1)) * z + all(1.650270098316988542046e2)) * z + all(4.328810604912902668951e2)) * z +
-                     all(4.853903996359136964868e2)) * z + all(1.945506571482613964425e2);
-    Lanes angle = t + t * z * p / q + (steep ? all(0.25 * std::numbers::pi) : zero);
-    angle = y > x ? all(0.5 * std::numbers::pi) - angle : angle;
-    angle = re < zero ? all(std::numbers::pi) - angle : angle;
+    const V zero = all<V>(0.0), x = max(re, -re), y = max(im, -im), low = min(x, y), high = max(x, y);
+    const auto steep = low > all<V>(0.41421356237309503) * high;
+    const V t = (steep ? low - high : low) / (steep ? low + high : high), z = t * t;
+    const V p = (((all<V>(-8.750608600031904122785e-1) * z - all<V>(1.615753718733365076637e1)) * z - all<V>(7.500855792314704667340e1)) * z -
+                     all<V>(1.228866684490136173410e2)) * z - all<V>(6.485021904942025371773e1);
+    const V q = ((((z + all<V>(2.485846490142306297962e1)) * z + all<V>(1.650270098316988542046e2)) * z + all<V>(4.328810604912902668951e2)) * z +
+                     all<V>(4.853903996359136964868e2)) * z + all<V>(1.945506571482613964425e2);
+    V angle = t + t * z * p / q + (steep ? all<V>(0.25 * std::numbers::pi) : zero);
+    angle = y > x ? all<V>(0.5 * std::numbers::pi) - angle : angle;
+    angle = re < zero ? all<V>(std::numbers::pi) - angle : angle;
     return im < zero ? -angle : angle;
 }
 
