@@ -2,6 +2,7 @@
 #include <array>
 #include <cmath>
 
+#include "core/parallel.h"
 #include "dem/detail/impl.h"
 
 namespace coral::dem {
@@ -93,11 +94,39 @@ int neighbours(const Level& level, int axis, Index c, std::array<Index, 3>& foun
     return count;
 }
 
+/// Pairs of body i with bodies of its size class and larger ones; within a class from the lower id.
+void find_pairs(const World::Impl& world, const std::vector<Level>& levels, std::size_t own, std::size_t i, const Vec3& p, double skin,
+                std::vector<BroadPair>& pairs)
+{
+    for (std::size_t l = own; l < levels.size(); ++l) {
+        const Level& level = levels[l];
+        if (level.members.empty()) continue;
+        const std::array<Index, 3> c = level.cell_of(p);
+        std::array<Index, 3> near[3];
+        int near_count[3];
+        for (int k = 0; k < 3; ++k) near_count[k] = neighbours(level, k, c[std::size_t(k)], near[k]);
+        for (int iz = 0; iz < near_count[2]; ++iz)
+            for (int iy = 0; iy < near_count[1]; ++iy)
+                for (int ix = 0; ix < near_count[0]; ++ix) {
+                    const std::size_t cell = std::size_t(near[0][std::size_t(ix)]) +
+                                             std::size_t(level.cells[0]) * (std::size_t(near[1][std::size_t(iy)]) +
+                                                                            std::size_t(level.cells[1]) * std::size_t(near[2][std::size_t(iz)]));
+                    for (Index m = level.start[cell]; m < level.start[cell + 1]; ++m) {
+                        const Index j = level.members[std::size_t(m)];
+                        if (l == own && j <= Index(i)) continue;
+                        const double reach = world.radius[i] + world.radius[std::size_t(j)] + skin;
+                        if (world.periodic(world.x[i] - world.x[std::size_t(j)]).squaredNorm() >= reach * reach) continue;
+                        if (world.motion[i] != Motion::free && world.motion[std::size_t(j)] != Motion::free) continue;
+                        pairs.push_back({std::min(Index(i), j), std::max(Index(i), j)});
+                    }
+                }
+    }
+}
+
 }  // namespace
 
 std::vector<BroadPair> broad_phase(const World::Impl& world, double skin)
 {
-    std::vector<BroadPair> pairs;
     const std::size_t n = world.x.size();
     std::vector<Vec3> p(n);
     double smallest = 0.0, largest = 0.0;
@@ -107,7 +136,7 @@ std::vector<BroadPair> broad_phase(const World::Impl& world, double skin)
         smallest = smallest == 0.0 ? world.radius[i] : std::min(smallest, world.radius[i]);
         largest = std::max(largest, world.radius[i]);
     }
-    if (smallest == 0.0) return pairs;
+    if (smallest == 0.0) return {};
     const int level_count = std::min(1 + int(std::log2(largest / smallest)), 16);
     std::vector<std::vector<Index>> bodies(static_cast<std::size_t>(level_count));
     std::vector<int> level_of(n, 0);
@@ -122,40 +151,21 @@ std::vector<BroadPair> broad_phase(const World::Impl& world, double skin)
         if (!bodies[l].empty()) fill(levels[l], p, bodies[l], world.periodic, skin);
     }
 
-    // Every pair is found from its smaller class; within a class from the lower id.
+    // Every pair is found from its smaller class. Blocks are the same for any number of threads, and so is the order of what they find.
+    constexpr std::size_t grain = 256;
+    std::vector<std::vector<BroadPair>> found((n + grain - 1) / grain);
+    parallel_blocks(n, grain, [&](std::size_t first, std::size_t last) {
+        for (std::size_t i = first; i < last; ++i)
+            if (world.in[i]) find_pairs(world, levels, std::size_t(level_of[i]), i, p[i], skin, found[first / grain]);
+    });
     std::vector<Index> count(n + 1, 0);
-    for (std::size_t i = 0; i < n; ++i) {
-        if (!world.in[i]) continue;
-        for (std::size_t l = std::size_t(level_of[i]); l < levels.size(); ++l) {
-            if (bodies[l].empty()) continue;
-            const Level& level = levels[l];
-            const std::array<Index, 3> c = level.cell_of(p[i]);
-            std::array<Index, 3> near[3];
-            int near_count[3];
-            for (int k = 0; k < 3; ++k) near_count[k] = neighbours(level, k, c[std::size_t(k)], near[k]);
-            for (int iz = 0; iz < near_count[2]; ++iz)
-                for (int iy = 0; iy < near_count[1]; ++iy)
-                    for (int ix = 0; ix < near_count[0]; ++ix) {
-                        const std::size_t cell = std::size_t(near[0][std::size_t(ix)]) +
-                                                 std::size_t(level.cells[0]) * (std::size_t(near[1][std::size_t(iy)]) +
-                                                                                std::size_t(level.cells[1]) * std::size_t(near[2][std::size_t(iz)]));
-                        for (Index m = level.start[cell]; m < level.start[cell + 1]; ++m) {
-                            const Index j = level.members[std::size_t(m)];
-                            if (int(l) == level_of[i] && j <= Index(i)) continue;
-                            const double reach = world.radius[i] + world.radius[std::size_t(j)] + skin;
-                            if (world.periodic(world.x[i] - world.x[std::size_t(j)]).squaredNorm() >= reach * reach) continue;
-                            if (world.motion[i] != Motion::free && world.motion[std::size_t(j)] != Motion::free) continue;
-                            const BroadPair pair{std::min(Index(i), j), std::max(Index(i), j)};
-                            pairs.push_back(pair);
-                            ++count[std::size_t(pair.a) + 1];
-                        }
-                    }
-        }
-    }
+    for (const std::vector<BroadPair>& part : found)
+        for (const BroadPair& pair : part) ++count[std::size_t(pair.a) + 1];
     for (std::size_t i = 1; i <= n; ++i) count[i] += count[i - 1];
-    std::vector<BroadPair> ordered(pairs.size());
+    std::vector<BroadPair> ordered(static_cast<std::size_t>(count[n]));
     std::vector<Index> next(count.begin(), count.end() - 1);
-    for (const BroadPair& pair : pairs) ordered[std::size_t(next[std::size_t(pair.a)]++)] = pair;
+    for (const std::vector<BroadPair>& part : found)
+        for (const BroadPair& pair : part) ordered[std::size_t(next[std::size_t(pair.a)]++)] = pair;
     for (std::size_t i = 0; i < n; ++i)
         std::sort(ordered.begin() + count[i], ordered.begin() + count[i + 1], [](const BroadPair& s, const BroadPair& t) { return s.b < t.b; });
     return ordered;

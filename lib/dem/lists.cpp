@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "core/parallel.h"
 #include "core/text.h"
 #include "dem/detail/impl.h"
 
@@ -89,16 +90,29 @@ void make_sphere_grid_list(World::Impl& world, const std::vector<BroadPair>& pai
         if (a != b) mixed.push_back(a ? BroadPair{pair.b, pair.a} : pair);
     }
     std::sort(mixed.begin(), mixed.end(), [](const BroadPair& s, const BroadPair& t) { return key_of(s.a, s.b) < key_of(t.a, t.b); });
+    const auto place_of = [&](const BroadPair& pair) -> Vec3 {
+        const std::size_t i = std::size_t(pair.a), j = std::size_t(pair.b);
+        return world.q[j].conjugate() * world.periodic(world.x[i] - world.x[j]);
+    };
+    constexpr std::size_t grain = 512;
+    std::vector<double> distances(mixed.size());  // most of the work: each waits for another place of memory
+    parallel_blocks(mixed.size(), grain, [&](std::size_t first, std::size_t last) {
+        for (std::size_t m = first; m < last; ++m) {
+            const std::size_t j = std::size_t(mixed[m].b);
+            const double scale = world.scale[j];
+            distances[m] = scale * detail::DistanceField(*world.shapes[std::size_t(world.shape[j])]).distance(place_of(mixed[m]) / scale);
+        }
+    });
     const bool all_walls = world.options.sphere_scheme == SphereScheme::walls;
     std::size_t k = 0;
-    for (const BroadPair& pair : mixed) {
+    for (std::size_t m = 0; m < mixed.size(); ++m) {
+        const BroadPair& pair = mixed[m];
         const std::size_t i = std::size_t(pair.a), j = std::size_t(pair.b);
-        const Shape& shape = *world.shapes[std::size_t(world.shape[j])];
-        const Vec3 local = world.q[j].conjugate() * world.periodic(world.x[i] - world.x[j]);
-        const double scale = world.scale[j], within = world.radius[i] + skin;
-        const detail::DistanceField field(shape);
-        const double distance = scale * field.distance(local / scale);
+        const double scale = world.scale[j], within = world.radius[i] + skin, distance = distances[m];
         if (distance >= within) continue;
+        const Shape& shape = *world.shapes[std::size_t(world.shape[j])];
+        const detail::DistanceField field(shape);
+        const Vec3 local = place_of(pair);
         // In a void the table answers for any radius; beyond its box, or where it is clamped, only out to its reach.
         if (scale * shape.exterior_reach() < world.radius[i] && (!field.grid->inside_box(local / scale) || distance >= scale * field.grid->outside_limit))
             throw Error(world.name(i) + " at " + world.name(j),
