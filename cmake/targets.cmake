@@ -9,7 +9,7 @@ target_compile_options(coral_warnings INTERFACE -Wall -Wextra -Wshadow -Wnon-vir
 add_compile_options(-fno-math-errno -fno-trapping-math)
 if(CORAL_NATIVE)
     add_compile_options(-march=native)
-    # Never wider than AVX2: with AVX-512 Eigen would sum in another order than on other processors, and GCC 12's header warns of its own
+    # Never wider than AVX2, but for modules that ask for it with CORAL_PROCESSOR_HAS_AVX512: with AVX-512 Eigen would sum in another order than on other processors, and GCC 12's header warns of its own
     # variables (GCC bug 105593).
     include(CheckCXXCompilerFlag)
     include(CheckCXXSourceCompiles)
