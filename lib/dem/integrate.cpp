@@ -21,12 +21,13 @@ void renormalize(double w, double x, double y, double z, Quat& q)
     q.w() = to_one * w, q.x() = to_one * x, q.y() = to_one * y, q.z() = to_one * z;
 }
 
-/// Turn by a small angle, second order and of unit length: enough for spheres, whose orientation is for looking at only. In plain numbers: Eigen's
-/// quaternions are written by halves and read whole, which stalls.
+/// Turn by a small angle: enough for spheres, whose orientation is for looking at only. In plain numbers: Eigen's quaternions are written by
+/// halves and read whole, which stalls.
 void turn_sphere(Quat& q, const Vec3& turn)
 {
-    const double w = q.w(), x = q.x(), y = q.y(), z = q.z(), a = 0.5 * turn.x(), b = 0.5 * turn.y(), c = 0.5 * turn.z();
-    renormalize(w - (a * x + b * y + c * z), x + (a * w + b * z - c * y), y + (b * w + c * x - a * z), z + (c * w + a * y - b * x), q);
+    double w = q.w(), x = q.x(), y = q.y(), z = q.z();
+    detail::turn_little(0.5 * turn.x(), 0.5 * turn.y(), 0.5 * turn.z(), w, x, y, z);
+    renormalize(w, x, y, z, q);
 }
 
 struct SineCosine {

@@ -3,7 +3,6 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <limits>
 #include <map>
 #include <numeric>
@@ -16,6 +15,7 @@ namespace coral::dem {
 
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
+using detail::load;
 
 namespace {
 
@@ -24,13 +24,6 @@ constexpr double never = 1e300;
 constexpr double flat = 1e-6;  ///< of the size: what lies this near to a plane lies in it; meshes come in single precision
 
 std::size_t padded(std::size_t n) { return (n + lanes - 1) / lanes * lanes; }
-
-detail::Lanes load(const double* values)
-{
-    detail::Lanes four;
-    std::memcpy(&four, values, sizeof four);
-    return four;
-}
 
 /// Least of values(i), those of i to i + 3, over i < count (a whole number of lanes), the first of equals within a lane.
 template <class Values>

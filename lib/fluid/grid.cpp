@@ -76,11 +76,9 @@ void* allocate_staggered(std::size_t bytes)
     if (bytes < large) return ::operator new (bytes, std::align_val_t{line});
     static std::atomic<std::size_t> count{0};
     const std::size_t shift = line + lines_apart * line * (count++ % places);
-    const bool huge = bytes >= huge_page;
-    const std::size_t whole = huge ? (bytes + shift + huge_page - 1) / huge_page * huge_page : bytes + shift;
-    auto* const memory = static_cast<std::byte*>(::operator new (whole, alignment_of(bytes)));
+    auto* const memory = static_cast<std::byte*>(::operator new (bytes + shift, alignment_of(bytes)));
 #ifdef MADV_HUGEPAGE
-    if (huge) madvise(memory, whole, MADV_HUGEPAGE);  // a wish: what becomes of it does not matter
+    if (bytes >= huge_page) madvise(memory, bytes + shift, MADV_HUGEPAGE);  // a wish: what becomes of it does not matter
 #endif
     std::byte* const array = memory + shift;
     std::memcpy(array - sizeof memory, &memory, sizeof memory);  // for free_staggered

@@ -68,6 +68,7 @@ private:
     void keep_state();
     void at_event();
     void write_results_now();
+    Checkpoint present_checkpoint() const;
     void write_checkpoint_now(const std::vector<std::uint8_t>& state);
     void stop_on_error();
     void finish(RunSummary& summary);
@@ -147,18 +148,25 @@ void Run::write_results_now()
     simulation_.timing().output += results_cost_;
 }
 
+/// What a checkpoint says of the case and the time; who writes it adds the states and how much of the outputs belongs to them.
+Checkpoint Run::present_checkpoint() const
+{
+    Checkpoint checkpoint;
+    checkpoint.time = simulation_.time();
+    checkpoint.cells = simulation_.has_flow() ? simulation_.flow().grid().cell_count() : 0;
+    checkpoint.bodies = simulation_.scene().bodies.size();
+    checkpoint.history = observer_.results().history;
+    return checkpoint;
+}
+
 /// results.h5 first: a checkpoint never counts rows that the file lacks.
 void Run::write_checkpoint_now(const std::vector<std::uint8_t>& state)
 {
     write_results_now();
     const Clock::time_point begin = Clock::now();
-    Checkpoint checkpoint;
-    checkpoint.time = simulation_.time();
+    Checkpoint checkpoint = present_checkpoint();
     checkpoint.rows = observer_.results().rows();
     checkpoint.frames = frames_.count();
-    checkpoint.cells = simulation_.has_flow() ? simulation_.flow().grid().cell_count() : 0;
-    checkpoint.bodies = simulation_.scene().bodies.size();
-    checkpoint.history = observer_.results().history;
     checkpoint.simulation = state;
     checkpoint.observer = observer_.save();
     write_checkpoint(checkpoint_file_, checkpoint);
@@ -218,14 +226,10 @@ void Run::stop_on_error()
     if (last_good_.empty()) return;
     observer_.results().performance = options_.timing ? performance_of(simulation_, earlier_) : std::vector<Measure>{};
     write_results(results_file_, observer_.results());
-    Checkpoint checkpoint;
     simulation_.restore(last_good_);
-    checkpoint.time = simulation_.time();
+    Checkpoint checkpoint = present_checkpoint();
     checkpoint.rows = last_rows_;
     checkpoint.frames = last_frames_;
-    checkpoint.cells = simulation_.has_flow() ? simulation_.flow().grid().cell_count() : 0;
-    checkpoint.bodies = simulation_.scene().bodies.size();
-    checkpoint.history = observer_.results().history;
     checkpoint.simulation = last_good_;
     checkpoint.observer = last_observer_;
     write_checkpoint(checkpoint_file_, checkpoint);

@@ -4,6 +4,7 @@
 /// order, so a contact's result does not depend on its neighbours in a group.
 #include <Eigen/Core>
 #include <cmath>
+#include <cstring>
 #include <numbers>
 #include <utility>
 #ifdef CORAL_AVX512
@@ -39,6 +40,14 @@ template <class V = Lanes>
 [[gnu::always_inline]] inline V all(double value)
 {
     return lanes_from<V>([=](int) { return value; });
+}
+/// Numbers one after the other, aligned or not.
+template <class V = Lanes>
+[[gnu::always_inline]] inline V load(const double* from)
+{
+    V a;
+    std::memcpy(&a, from, sizeof a);
+    return a;
 }
 [[gnu::always_inline]] inline Lanes widened(FloatLanes a) { return __builtin_convertvector(a, Lanes); }
 template <class V>
@@ -147,10 +156,6 @@ template <class V, class Of>
 [[gnu::always_inline]] inline VectorsOf<V> vectors_from(const Of& of)
 {
     return {lanes_from<V>([&](int k) { return of(k).x(); }), lanes_from<V>([&](int k) { return of(k).y(); }), lanes_from<V>([&](int k) { return of(k).z(); })};
-}
-[[gnu::always_inline]] inline Vec3Lanes gather(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c, const Eigen::Vector3d& d)
-{
-    return {Lanes{a.x(), b.x(), c.x(), d.x()}, Lanes{a.y(), b.y(), c.y(), d.y()}, Lanes{a.z(), b.z(), c.z(), d.z()}};
 }
 
 #ifdef CORAL_AVX512

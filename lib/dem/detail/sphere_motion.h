@@ -11,6 +11,14 @@ namespace coral::dem::detail {
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wpsabi"
 
+/// The quaternion s + (x, y, z) times one of a small turn, half of which is (a, b, c): to second order, once it has unit length again.
+template <class V>
+[[gnu::always_inline]] inline void turn_little(V a, V b, V c, V& s, V& x, V& y, V& z)
+{
+    const V now_s = s - (a * x + b * y + c * z), now_x = x + (a * s + b * z - c * y), now_y = y + (b * s + c * x - a * z), now_z = z + (c * s + a * y - b * x);
+    s = now_s, x = now_x, y = now_y, z = now_z;
+}
+
 class SphereMotion {
 public:
     static constexpr std::size_t count = std::size_t(wide_lane_count);
@@ -93,18 +101,8 @@ private:
     bool bare_;
     Lanes farthest2_ = all<Lanes>(0.0), finite_ = farthest2_, gravity_work_ = farthest2_;
 
-    static Lanes load(const double* from)
-    {
-        Lanes a;
-        std::memcpy(&a, from, sizeof a);
-        return a;
-    }
-    static Flat load(const Vec3* from)
-    {
-        Flat a;
-        std::memcpy(&a, from, sizeof a);
-        return a;
-    }
+    static Lanes load(const double* from) { return detail::load<Lanes>(from); }
+    static Flat load(const Vec3* from) { return {load(from->data()), load(from->data() + n), load(from->data() + 2 * n)}; }
     static void store(const Flat& a, Vec3* to) { std::memcpy(to->data(), &a, sizeof a); }
 
     static Flat repeat(const Vec3& v)
@@ -145,14 +143,13 @@ private:
     {
         Lanes q[4];  // as they lie in memory
         std::memcpy(q, w_.q[i].coeffs().data(), sizeof q);
-        const Lanes x = part<0>(q), y = part<1>(q), z = part<2>(q), s = part<3>(q);
-        const Lanes a = 0.5 * dt_ * number<0>(w), b = 0.5 * dt_ * number<1>(w), c = 0.5 * dt_ * number<2>(w);
-        const Lanes now_s = s - (a * x + b * y + c * z), now_x = x + (a * s + b * z - c * y), now_y = y + (b * s + c * x - a * z), now_z = z + (c * s + a * y - b * x);
-        const Lanes one = all<Lanes>(1.0), length2 = now_s * now_s + now_x * now_x + now_y * now_y + now_z * now_z;
+        Lanes x = part<0>(q), y = part<1>(q), z = part<2>(q), s = part<3>(q);
+        turn_little(0.5 * dt_ * number<0>(w), 0.5 * dt_ * number<1>(w), 0.5 * dt_ * number<2>(w), s, x, y, z);
+        const Lanes one = all<Lanes>(1.0), length2 = s * s + x * x + y * y + z * z;
         Lanes to_one = all<Lanes>(1.5) - 0.5 * length2;
         const auto far = max(length2 - one, one - length2) >= all<Lanes>(1e-4);
         if (any(far)) to_one = far ? one / sqrt(length2) : to_one;
-        interleave(to_one * now_x, to_one * now_y, to_one * now_z, to_one * now_s, q);
+        interleave(to_one * x, to_one * y, to_one * z, to_one * s, q);
         std::memcpy(w_.q[i].coeffs().data(), q, sizeof q);
     }
     template <int c>
