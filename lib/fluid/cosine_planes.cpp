@@ -1,12 +1,11 @@
 #include "fluid/detail/cosine_planes.h"
 
-#include <fftw3.h>
-
 #include <cmath>
 #include <numbers>
 #include <utility>
 #include <vector>
 
+#include "fluid/detail/fftw.h"
 #include "fluid/grid.h"
 
 namespace coral::fluid::detail {
@@ -19,83 +18,89 @@ std::mutex& planner_mutex()
 
 namespace {
 
+template <class Real>
 struct Complex {
-    double re = 0.0, im = 0.0;
+    Real re = 0, im = 0;
 };
-using Buffer = std::vector<Complex, CacheAligned<Complex>>;
 
-inline Complex operator+(Complex a, Complex b)
+template <class Real>
+inline Complex<Real> operator+(Complex<Real> a, Complex<Real> b)
 {
     return {a.re + b.re, a.im + b.im};
 }
-inline Complex operator-(Complex a, Complex b)
+template <class Real>
+inline Complex<Real> operator-(Complex<Real> a, Complex<Real> b)
 {
     return {a.re - b.re, a.im - b.im};
 }
-inline Complex operator*(Complex a, Complex b)
+template <class Real>
+inline Complex<Real> operator*(Complex<Real> a, Complex<Real> b)
 {
     return {a.re * b.re - a.im * b.im, a.re * b.im + a.im * b.re};
 }
-inline Complex conj(Complex a)
+template <class Real>
+inline Complex<Real> conj(Complex<Real> a)
 {
     return {a.re, -a.im};
 }
-inline Complex times_i(Complex a)
+template <class Real>
+inline Complex<Real> times_i(Complex<Real> a)
 {
     return {-a.im, a.re};
 }
 
 /// Order and twiddles of one direction: sample s of the real sequence is entry place[s] of the complex one.
+template <class Real>
 struct Direction {
     std::vector<std::size_t> place;
-    std::vector<Complex> twiddle;  ///< exp(-i pi k / 2n)
+    std::vector<Complex<Real>> twiddle;  ///< exp(-i pi k / 2n)
     explicit Direction(std::size_t n)
     {
         for (std::size_t s = 0; s < n; ++s) {
             place.push_back(s % 2 == 0 ? s / 2 : n - 1 - s / 2);
             const double angle = std::numbers::pi * double(s) / (2.0 * double(n));
-            twiddle.push_back({std::cos(angle), -std::sin(angle)});
+            twiddle.push_back({Real(std::cos(angle)), Real(-std::sin(angle))});
         }
     }
 };
 
 /// C(k) = w V(k) + w* V(n-k), C(n-k) = i (w V(k) - w* V(n-k)): holds for two real sequences packed as one, because it
 /// is linear.
-inline void to_cosine(Complex w, Complex& low, Complex& high)
+template <class Real>
+inline void to_cosine(Complex<Real> w, Complex<Real>& low, Complex<Real>& high)
 {
-    const Complex p = w * low, q = conj(w) * high;
+    const Complex<Real> p = w * low, q = conj(w) * high;
     low = p + q;
     high = times_i(p - q);
 }
 
 /// V(k) = w* (C(k) - i C(n-k)), V(n-k) = w (C(k) + i C(n-k)).
-inline void from_cosine(Complex w, Complex& low, Complex& high)
+template <class Real>
+inline void from_cosine(Complex<Real> w, Complex<Real>& low, Complex<Real>& high)
 {
-    const Complex turned = times_i(high);
+    const Complex<Real> turned = times_i(high);
     high = w * (low + turned);
     low = conj(w) * (low - turned);
 }
 
 }  // namespace
 
-struct CosinePlanes::Impl {
+template <class Real>
+struct CosinePlanes<Real>::Impl {
+    using Number = Complex<Real>;
+    using Buffer = std::vector<Number, CacheAligned<Number>>;
+    using Fft = Fftw<Real>;
     std::size_t na, nb;
-    Direction a, b;
-    fftw_plan forth = nullptr, back = nullptr;
+    Direction<Real> a, b;
+    PlanOf<Real> forth, back;
 
     Impl(std::size_t na_, std::size_t nb_) : na(na_), nb(nb_), a(na_), b(nb_)
     {
         Buffer sample(na * nb);
         const std::lock_guard lock(planner_mutex());
-        auto* data = reinterpret_cast<fftw_complex*>(sample.data());
-        forth = fftw_plan_dft_2d(int(nb), int(na), data, data, FFTW_FORWARD, FFTW_ESTIMATE);
-        back = fftw_plan_dft_2d(int(nb), int(na), data, data, FFTW_BACKWARD, FFTW_ESTIMATE);
-    }
-    ~Impl()
-    {
-        const std::lock_guard lock(planner_mutex());
-        fftw_destroy_plan(forth);
-        fftw_destroy_plan(back);
+        auto* data = reinterpret_cast<typename Fft::Complex*>(sample.data());
+        forth.plan = Fft::plan_dft_2d(int(nb), int(na), data, data, FFTW_FORWARD, FFTW_ESTIMATE);
+        back.plan = Fft::plan_dft_2d(int(nb), int(na), data, data, FFTW_BACKWARD, FFTW_ESTIMATE);
     }
     Buffer& buffer() const
     {
@@ -103,41 +108,49 @@ struct CosinePlanes::Impl {
         values.resize(na * nb);
         return values;
     }
+    static void transform(const PlanOf<Real>& plan, Buffer& buffer)
+    {
+        auto* data = reinterpret_cast<typename Fft::Complex*>(buffer.data());
+        Fft::execute_dft(plan.plan, data, data);
+    }
 };
 
-CosinePlanes::CosinePlanes(std::size_t na, std::size_t nb) : impl_(std::make_unique<Impl>(na, nb)) {}
-CosinePlanes::~CosinePlanes() = default;
+template <class Real>
+CosinePlanes<Real>::CosinePlanes(std::size_t na, std::size_t nb) : impl_(std::make_unique<Impl>(na, nb)) {}
+template <class Real>
+CosinePlanes<Real>::~CosinePlanes() = default;
 
-void CosinePlanes::forward(double* first, double* second) const
+template <class Real>
+void CosinePlanes<Real>::forward(Real* first, Real* second) const
 {
+    using Number = Complex<Real>;
     const std::size_t na = impl_->na, nb = impl_->nb;
-    Buffer& buffer = impl_->buffer();
+    auto& buffer = impl_->buffer();
     for (std::size_t j = 0; j < nb; ++j) {
-        Complex* row = buffer.data() + impl_->b.place[j] * na;
-        const double *x = first + j * na, *y = second ? second + j * na : nullptr;
-        for (std::size_t i = 0; i < na; ++i) row[impl_->a.place[i]] = {x[i], y ? y[i] : 0.0};
+        Number* row = buffer.data() + impl_->b.place[j] * na;
+        const Real *x = first + j * na, *y = second ? second + j * na : nullptr;
+        for (std::size_t i = 0; i < na; ++i) row[impl_->a.place[i]] = {x[i], y ? y[i] : Real(0)};
     }
-    auto* data = reinterpret_cast<fftw_complex*>(buffer.data());
-    fftw_execute_dft(impl_->forth, data, data);
+    Impl::transform(impl_->forth, buffer);
     for (std::size_t k = 1; k <= nb / 2; ++k) {
-        const Complex w = impl_->b.twiddle[k];
-        Complex *low = buffer.data() + k * na, *high = buffer.data() + (nb - k) * na;
+        const Number w = impl_->b.twiddle[k];
+        Number *low = buffer.data() + k * na, *high = buffer.data() + (nb - k) * na;
         if (low == high)  // the middle row is its own partner
             for (std::size_t i = 0; i < na; ++i) low[i] = w * low[i] + conj(w) * low[i];
         else
             for (std::size_t i = 0; i < na; ++i) to_cosine(w, low[i], high[i]);
     }
     for (std::size_t j = 0; j < nb; ++j) {
-        Complex* row = buffer.data() + j * na;
-        const double scale = j == 0 ? 2.0 : 1.0;  // row 0 has no partner either: C(0) = 2 V(0)
-        double *x = first + j * na, *y = second ? second + j * na : nullptr;
-        const auto put = [&](std::size_t i, Complex value) {
+        Number* row = buffer.data() + j * na;
+        const Real scale = j == 0 ? Real(2) : Real(1);  // row 0 has no partner either: C(0) = 2 V(0)
+        Real *x = first + j * na, *y = second ? second + j * na : nullptr;
+        const auto put = [&](std::size_t i, Number value) {
             x[i] = scale * value.re;
             if (y) y[i] = scale * value.im;
         };
         put(0, row[0] + row[0]);
         for (std::size_t i = 1; i <= na / 2; ++i) {
-            Complex low = row[i], high = row[na - i];
+            Number low = row[i], high = row[na - i];
             to_cosine(impl_->a.twiddle[i], low, high);
             put(na - i, high);
             put(i, low);  // last: in the middle of an even row both are the same entry, and `low` is right
@@ -145,42 +158,46 @@ void CosinePlanes::forward(double* first, double* second) const
     }
 }
 
-void CosinePlanes::backward(double* first, double* second) const
+template <class Real>
+void CosinePlanes<Real>::backward(Real* first, Real* second) const
 {
+    using Number = Complex<Real>;
     const std::size_t na = impl_->na, nb = impl_->nb;
-    Buffer& buffer = impl_->buffer();
+    auto& buffer = impl_->buffer();
     for (std::size_t j = 0; j < nb; ++j) {
-        Complex* row = buffer.data() + j * na;
-        const double *x = first + j * na, *y = second ? second + j * na : nullptr;
-        row[0] = {x[0], y ? y[0] : 0.0};
+        Number* row = buffer.data() + j * na;
+        const Real *x = first + j * na, *y = second ? second + j * na : nullptr;
+        row[0] = {x[0], y ? y[0] : Real(0)};
         for (std::size_t i = 1; i <= na / 2; ++i) {
-            Complex low = {x[i], y ? y[i] : 0.0}, high = {x[na - i], y ? y[na - i] : 0.0};
+            Number low = {x[i], y ? y[i] : Real(0)}, high = {x[na - i], y ? y[na - i] : Real(0)};
             from_cosine(impl_->a.twiddle[i], low, high);
             row[i] = low;
             row[na - i] = high;
         }
     }
     for (std::size_t k = 1; k <= nb / 2; ++k) {
-        const Complex w = impl_->b.twiddle[k];
-        Complex *low = buffer.data() + k * na, *high = buffer.data() + (nb - k) * na;
+        const Number w = impl_->b.twiddle[k];
+        Number *low = buffer.data() + k * na, *high = buffer.data() + (nb - k) * na;
         for (std::size_t i = 0; i < na; ++i) {
-            Complex p = low[i], q = high[i];
+            Number p = low[i], q = high[i];
             from_cosine(w, p, q);
             low[i] = p;
             high[i] = q;
         }
     }
-    auto* data = reinterpret_cast<fftw_complex*>(buffer.data());
-    fftw_execute_dft(impl_->back, data, data);
+    Impl::transform(impl_->back, buffer);
     for (std::size_t j = 0; j < nb; ++j) {
-        const Complex* row = buffer.data() + impl_->b.place[j] * na;
-        double *x = first + j * na, *y = second ? second + j * na : nullptr;
+        const Number* row = buffer.data() + impl_->b.place[j] * na;
+        Real *x = first + j * na, *y = second ? second + j * na : nullptr;
         for (std::size_t i = 0; i < na; ++i) {
-            const Complex value = row[impl_->a.place[i]];
+            const Number value = row[impl_->a.place[i]];
             x[i] = value.re;
             if (y) y[i] = value.im;
         }
     }
 }
+
+template class CosinePlanes<double>;
+template class CosinePlanes<float>;
 
 }  // namespace coral::fluid::detail

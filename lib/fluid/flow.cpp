@@ -26,30 +26,32 @@ double seconds_since(std::chrono::steady_clock::time_point start)
 }
 
 /// What passes the low and the high side of each cell of a row along one axis; pointers of their own let loops vectorise.
+template <class Real>
 struct RowSides {
-    const double *low, *high;  ///< velocity
+    const Real *low, *high;  ///< velocity
     // only with fines: solid flux; void fraction of the cell before, of the cell, of the one after
-    const double *J_low = nullptr, *J_high = nullptr, *eps_low = nullptr, *eps = nullptr, *eps_high = nullptr;
+    const Real *J_low = nullptr, *J_high = nullptr, *eps_low = nullptr, *eps = nullptr, *eps_high = nullptr;
 
-    RowSides(const std::array<Field, 3>& u, const PorousFields& porous, const Layout& layout, int axis,
+    RowSides(const std::array<FlowField, 3>& u, const PorousFields& porous, const Layout& layout, int axis,
              std::ptrdiff_t c0)
     {
         const auto d = std::size_t(axis);
         const std::ptrdiff_t s = layout.stride[axis];
-        low = u[d].data() + c0, high = low + s;
+        low = u[d].data<Real>() + c0, high = low + s;
         if (porous.void_fraction.empty()) return;
-        J_low = porous.solid_flux[d].data() + c0, J_high = J_low + s;
-        eps = porous.void_fraction.data() + c0, eps_low = eps - s, eps_high = eps + s;
+        J_low = porous.solid_flux[d].data<Real>() + c0, J_high = J_low + s;
+        eps = porous.void_fraction.data<Real>() + c0, eps_low = eps - s, eps_high = eps + s;
     }
     template <bool porous>
-    double outflow(std::ptrdiff_t i) const
+    Real outflow(std::ptrdiff_t i) const
     {
+        constexpr Real half = Real(0.5);
         if constexpr (!porous) return high[i] - low[i];
-        return (0.5 * (eps[i] + eps_high[i]) * high[i] + J_high[i]) - (0.5 * (eps[i] + eps_low[i]) * low[i] + J_low[i]);
+        return (half * (eps[i] + eps_high[i]) * high[i] + J_high[i]) - (half * (eps[i] + eps_low[i]) * low[i] + J_low[i]);
     }
-    double speed(std::ptrdiff_t i) const
+    Real speed(std::ptrdiff_t i) const
     {
-        const double a = std::abs(low[i]), b = std::abs(high[i]);
+        const Real a = std::abs(low[i]), b = std::abs(high[i]);
         return a > b ? a : b;
     }
 };
@@ -84,17 +86,17 @@ Flow::Flow(const GridSpec& grid, const FlowOptions& options) : grid_(grid), layo
         throw UsageError("fluid.kinematic_viscosity", "is not positive", "water has 1e-6 m2/s");
     if (!(options.cfl > 0.0 && options.cfl <= max_cfl(options.scheme)))
         throw UsageError("time.cfl", "is outside (0, " + to_text(max_cfl(options.scheme)) + "]", "0.5 is a good choice");
-    poisson_ = std::make_shared<const Poisson>(grid);
+    poisson_ = std::make_shared<const Poisson>(grid, options.precision);
     for (int axis = 0; axis < 3; ++axis) {
-        velocity_[axis] = layout_.make_field();
-        provisional_[axis] = layout_.make_field();
-        rate_[axis] = layout_.make_field();
-        if (options.scheme == TimeScheme::runge_kutta) start_[axis] = layout_.make_field(), held_[axis] = layout_.make_field();
+        velocity_[axis] = make_field();
+        provisional_[axis] = make_field();
+        rate_[axis] = make_field();
+        if (options.scheme == TimeScheme::runge_kutta) start_[axis] = make_field(), held_[axis] = make_field();
     }
-    pressure_ = layout_.make_field();
+    pressure_ = make_field();
     work_ = poisson_->make_work();
     const std::size_t blocks = (std::size_t(grid.cells.z()) + 1 + planes_per_block - 1) / planes_per_block;
-    scratch_ = Field(blocks * scratch_block(), 0.0);
+    scratch_ = FlowField(blocks * scratch_block(), options.precision);
     restart_history();
 }
 
@@ -102,8 +104,8 @@ void Flow::restart_history()
 {
     fill_velocity_ghosts();
     fill_pressure_ghosts();
-    for (Field& rate : rate_) std::fill(rate.begin(), rate.end(), 0.0);
-    for (Field& hold : held_) std::fill(hold.begin(), hold.end(), 0.0);
+    for (FlowField& rate : rate_) rate.fill(0.0);
+    for (FlowField& hold : held_) hold.fill(0.0);
     flux_rate_.setZero();
     advective_sum_.setZero();
     pending_defect_.setZero();
@@ -132,17 +134,17 @@ double Flow::stable_time_step() const
 PorousFields& Flow::porous_fields_for_writing()
 {
     if (porous_.void_fraction.empty()) {
-        porous_.void_fraction = layout_.make_field(1.0);
+        porous_.void_fraction = make_field(1.0);
         for (int axis = 0; axis < 3; ++axis) {
-            porous_.solid_flux[axis] = layout_.make_field();
-            porous_.drag_rate[axis] = layout_.make_field();
-            porous_.drag_force[axis] = layout_.make_field();
+            porous_.solid_flux[axis] = make_field();
+            porous_.drag_rate[axis] = make_field();
+            porous_.drag_force[axis] = make_field();
         }
     }
     return porous_;
 }
 
-void Flow::change_void_fraction(Field& void_fraction)
+void Flow::change_void_fraction(FlowField& void_fraction)
 {
     porous_fields_for_writing();
     fill_centre_ghosts(void_fraction);
@@ -155,115 +157,110 @@ void Flow::change_void_fraction(Field& void_fraction)
     pending_defect_ = momentum - momentum_.after;
 }
 
+/// Sum over the unknown faces of a component of eps times value(f, i) for face f + i, half at outlets.
+template <class Real, class Value>
+double Flow::sum_over_faces(int axis, const Value& value) const
+{
+    const FaceRange range(grid_, axis);
+    const Real* eps = has_fines_ ? porous_.void_fraction.data<Real>() : nullptr;
+    return parallel_sum(range.planes(), planes_per_block, 0.0, [&](std::size_t begin, std::size_t end) {
+        double sum = 0.0;
+        for (int k = range.low.z() + int(begin); k < range.low.z() + int(end); ++k)
+            for (int j = range.low.y(); j < range.high.y(); ++j) {
+                const std::size_t f0 = layout_.index(range.low.x(), j, k);
+                const Real* high = eps ? eps + f0 : nullptr;
+                const Real* low = eps ? high - layout_.stride[axis] : nullptr;
+                sum += eps ? detail::weighted_row(grid_, axis, range, j, k, add_lanes,
+                                                  [&](std::ptrdiff_t i) { return Real(0.5) * (low[i] + high[i]) * value(f0, i); })
+                           : detail::weighted_row(grid_, axis, range, j, k, add_lanes,
+                                                  [&](std::ptrdiff_t i) { return value(f0, i); });
+            }
+        return sum;
+    });
+}
+
 /// Mass of fluid that the equations of each component move: half volumes at outlets, none at given velocities.
 void Flow::find_fluid_mass()
 {
-    for (int axis = 0; axis < 3; ++axis) {
-        const FaceRange range(grid_, axis);
-        fluid_mass_[axis] =
-            parallel_sum(range.planes(), planes_per_block, 0.0, [&](std::size_t begin, std::size_t end) {
-                double sum = 0.0;
-                for (int k = range.low.z() + int(begin); k < range.low.z() + int(end); ++k)
-                    for (int j = range.low.y(); j < range.high.y(); ++j) {
-                        const std::size_t f0 = layout_.index(range.low.x(), j, k);
-                        const double* high = has_fines_ ? porous_.void_fraction.data() + f0 : nullptr;
-                        const double* low = has_fines_ ? high - layout_.stride[axis] : nullptr;
-                        sum += has_fines_
-                                   ? detail::weighted_row(grid_, axis, range, j, k, add_lanes,
-                                                          [&](std::ptrdiff_t i) { return 0.5 * (low[i] + high[i]); })
-                                   : detail::weighted_row(grid_, axis, range, j, k, add_lanes,
-                                                          [](std::ptrdiff_t) { return 1.0; });
-                    }
-                return sum;
-            });
-    }
+    in_precision(options_.precision, [&]<class Real>(Real) {
+        for (int axis = 0; axis < 3; ++axis)
+            fluid_mass_[axis] = sum_over_faces<Real>(axis, [](std::size_t, std::ptrdiff_t) { return Real(1); });
+    });
     fluid_mass_ *= options_.density * grid_.cell_volume();
 }
 
 Eigen::Vector3d Flow::total_momentum() const
 {
     Eigen::Vector3d total;
-    for (int axis = 0; axis < 3; ++axis) {
-        const FaceRange range(grid_, axis);
-        const double* u = velocity_[axis].data();
-        total[axis] = parallel_sum(range.planes(), planes_per_block, 0.0, [&](std::size_t begin, std::size_t end) {
-            double sum = 0.0;
-            for (int k = range.low.z() + int(begin); k < range.low.z() + int(end); ++k)
-                for (int j = range.low.y(); j < range.high.y(); ++j) {
-                    const std::size_t f0 = layout_.index(range.low.x(), j, k);
-                    const double* row = u + f0;
-                    const double* high = has_fines_ ? porous_.void_fraction.data() + f0 : nullptr;
-                    const double* low = has_fines_ ? high - layout_.stride[axis] : nullptr;
-                    sum += has_fines_ ? detail::weighted_row(
-                                            grid_, axis, range, j, k, add_lanes,
-                                            [&](std::ptrdiff_t i) { return 0.5 * (low[i] + high[i]) * row[i]; })
-                                      : detail::weighted_row(grid_, axis, range, j, k, add_lanes,
-                                                             [&](std::ptrdiff_t i) { return row[i]; });
-                }
-            return sum;
-        });
-    }
+    in_precision(options_.precision, [&]<class Real>(Real) {
+        for (int axis = 0; axis < 3; ++axis) {
+            const Real* u = velocity_[axis].data<Real>();
+            total[axis] = sum_over_faces<Real>(axis, [u](std::size_t f0, std::ptrdiff_t i) { return u[f0 + std::size_t(i)]; });
+        }
+    });
     return options_.density * grid_.cell_volume() * total;
 }
 
-/// Right-hand side div(eps u* + J_s)/dt into work_, then its solution.
-void Flow::solve_increment(double dt)
+/// Right-hand side div(eps u* + J_s)/dt into work_.
+template <class Real>
+void Flow::find_source(double dt)
 {
-    const double scale = 1.0 / (grid_.cell * dt);
+    const Real scale = Real(1.0 / (grid_.cell * dt));
     parallel_blocks(std::size_t(grid_.cells.z()), planes_per_block, [&](std::size_t begin, std::size_t end) {
         for (std::size_t k = begin; k < end; ++k)
             for (int j = 0; j < grid_.cells.y(); ++j) {
                 const auto c0 = std::ptrdiff_t(layout_.index(0, j, int(k)));
-                const RowSides x(provisional_, porous_, layout_, 0, c0), y(provisional_, porous_, layout_, 1, c0),
+                const RowSides<Real> x(provisional_, porous_, layout_, 0, c0), y(provisional_, porous_, layout_, 1, c0),
                     z(provisional_, porous_, layout_, 2, c0);
-                double* __restrict b = work_.data() + k * poisson_->plane() + std::size_t(j) * poisson_->row();
+                Real* __restrict b = work_.data<Real>() + k * poisson_->plane() + std::size_t(j) * poisson_->row();
                 const std::ptrdiff_t n = grid_.cells.x();
                 if (has_fines_) {
 #pragma GCC ivdep
                     for (std::ptrdiff_t i = 0; i < n; ++i)
-                        b[i] = scale * (x.outflow<true>(i) + y.outflow<true>(i) + z.outflow<true>(i));
+                        b[i] = scale * (x.template outflow<true>(i) + y.template outflow<true>(i) + z.template outflow<true>(i));
                 } else {
 #pragma GCC ivdep
                     for (std::ptrdiff_t i = 0; i < n; ++i)
-                        b[i] = scale * (x.outflow<false>(i) + y.outflow<false>(i) + z.outflow<false>(i));
+                        b[i] = scale * (x.template outflow<false>(i) + y.template outflow<false>(i) + z.template outflow<false>(i));
                 }
             }
     });
-    poisson_->solve(work_, turned_);
 }
 
 /// Rows of component `axis` at plane k: u = u* - dt grad(pi)/eps. \returns the weighted sum of eps u
-double Flow::correct_row(int axis, const FaceRange& range, int j, int k, double factor)
+template <class Real>
+double Flow::correct_row(int axis, const FaceRange& range, int j, int k, double dt)
 {
-    const double* pi = work_.data();
+    const Real factor = Real(dt / grid_.cell);
+    const Real* pi = work_.data<Real>();
     const auto f0 = std::ptrdiff_t(layout_.index(range.low.x(), j, k));
     const std::ptrdiff_t own = layout_.stride[axis];
-    const double* us = provisional_[axis].data() + f0;
-    double* __restrict u = velocity_[axis].data() + f0;
-    const double* eps = has_fines_ ? porous_.void_fraction.data() + f0 : nullptr;
-    const auto face_eps = [&](std::ptrdiff_t i) { return eps ? 0.5 * (eps[i] + eps[i - own]) : 1.0; };
+    const Real* us = provisional_[axis].data<Real>() + f0;
+    Real* __restrict u = velocity_[axis].data<Real>() + f0;
+    const Real* eps = has_fines_ ? porous_.void_fraction.data<Real>() + f0 : nullptr;
+    const auto face_eps = [&](std::ptrdiff_t i) { return eps ? Real(0.5) * (eps[i] + eps[i - own]) : Real(1); };
     const auto row_of = [&](int jj, int kk) {
         return pi + std::size_t(kk) * poisson_->plane() + std::size_t(jj) * poisson_->row();
     };
     const int n = grid_.cells[axis];
     if (axis == 0) {
-        const double* row = row_of(j, k);
+        const Real* row = row_of(j, k);
         const int low = range.low.x();
         for (int i = std::max(low, 1); i < std::min(range.high.x(), n); ++i)
-            u[i - low] = us[i - low] - factor * (row[i] - row[i - 1]) / (eps ? face_eps(i - low) : 1.0);
+            u[i - low] = us[i - low] - factor * (row[i] - row[i - 1]) / (eps ? face_eps(i - low) : Real(1));
         if (low == 0) {
-            const double before = grid_.periodic(0) ? row[n - 1] : -row[0];
+            const Real before = grid_.periodic(0) ? row[n - 1] : -row[0];
             u[0] = us[0] - factor * (row[0] - before) / face_eps(0);
         }
-        if (range.high.x() > n) u[n - low] = us[n - low] + 2.0 * factor * row[n - 1] / face_eps(n - low);
+        if (range.high.x() > n) u[n - low] = us[n - low] + 2 * factor * row[n - 1] / face_eps(n - low);
     } else {
         const int position = axis == 1 ? j : k;
         const auto row_at = [&](int at) { return axis == 1 ? row_of(at, k) : row_of(j, at); };
-        const double* high = row_at(std::min(position, n - 1));
-        const double* low = row_at(position > 0 ? position - 1 : (grid_.periodic(axis) ? n - 1 : 0));
+        const Real* high = row_at(std::min(position, n - 1));
+        const Real* low = row_at(position > 0 ? position - 1 : (grid_.periodic(axis) ? n - 1 : 0));
         // the increment is zero on an outlet face: the cell beyond it holds the negative
-        const double high_sign = position == n ? -1.0 : 1.0;
-        const double low_sign = position == 0 && !grid_.periodic(axis) ? -1.0 : 1.0;
+        const Real high_sign = position == n ? Real(-1) : Real(1);
+        const Real low_sign = position == 0 && !grid_.periodic(axis) ? Real(-1) : Real(1);
         const std::ptrdiff_t m = range.row_length();
         if (eps)
             for (std::ptrdiff_t i = 0; i < m; ++i)
@@ -277,9 +274,9 @@ double Flow::correct_row(int axis, const FaceRange& range, int j, int k, double 
     return detail::weighted_row(grid_, axis, range, j, k, add_lanes, [&](std::ptrdiff_t i) { return u[i]; });
 }
 
+template <class Real>
 void Flow::correct(double dt)
 {
-    const double factor = dt / grid_.cell;
     const FaceRange ranges[3] = {FaceRange(grid_, 0), FaceRange(grid_, 1), FaceRange(grid_, 2)};
     const auto planes = std::size_t(grid_.cells.z()) + 1;
     const Eigen::Vector3d zero = Eigen::Vector3d::Zero();
@@ -289,12 +286,12 @@ void Flow::correct(double dt)
             for (int axis = 0; axis < 3; ++axis) {
                 if (k < ranges[axis].low.z() || k >= ranges[axis].high.z()) continue;
                 for (int j = ranges[axis].low.y(); j < ranges[axis].high.y(); ++j)
-                    part[axis] += correct_row(axis, ranges[axis], j, k, factor);
+                    part[axis] += correct_row<Real>(axis, ranges[axis], j, k, dt);
             }
             if (k == grid_.cells.z()) continue;
             for (int j = 0; j < grid_.cells.y(); ++j) {
-                double* p = pressure_.data() + layout_.index(0, j, k);
-                const double* pi = work_.data() + std::size_t(k) * poisson_->plane() + std::size_t(j) * poisson_->row();
+                Real* p = pressure_.data<Real>() + layout_.index(0, j, k);
+                const Real* pi = work_.data<Real>() + std::size_t(k) * poisson_->plane() + std::size_t(j) * poisson_->row();
                 for (int i = 0; i < grid_.cells.x(); ++i) p[i] += pi[i];
             }
         }
@@ -303,8 +300,9 @@ void Flow::correct(double dt)
     momentum_.after = options_.density * grid_.cell_volume() * sum;
 }
 
-/// Largest divergence and largest sum_i |u_i| over the cells.
-void Flow::diagnose()
+/// Over the cells: cell times |div(eps u + J_s)|, and sum_i |u_i| [m/s].
+template <class Real>
+Eigen::Vector2d Flow::largest_divergence_and_speed() const
 {
     std::vector<Eigen::Vector2d> largest((std::size_t(grid_.cells.z()) + planes_per_block - 1) / planes_per_block,
                                          {0.0, 0.0});
@@ -313,41 +311,48 @@ void Flow::diagnose()
         for (int k = int(begin); k < int(end); ++k)
             for (int j = 0; j < grid_.cells.y(); ++j) {
                 const auto c0 = std::ptrdiff_t(layout_.index(0, j, k));
-                const RowSides x(velocity_, porous_, layout_, 0, c0), y(velocity_, porous_, layout_, 1, c0),
+                const RowSides<Real> x(velocity_, porous_, layout_, 0, c0), y(velocity_, porous_, layout_, 1, c0),
                     z(velocity_, porous_, layout_, 2, c0);
                 const std::ptrdiff_t n = grid_.cells.x();
-                const double speed =
+                const Real speed =
                     detail::lane_max(n, [=](std::ptrdiff_t i) { return x.speed(i) + y.speed(i) + z.speed(i); });
                 const auto divergence = [=](auto porous) {
                     return detail::lane_max(n, [=](std::ptrdiff_t i) {
                         constexpr bool p = decltype(porous)::value;
-                        return std::abs(x.outflow<p>(i) + y.outflow<p>(i) + z.outflow<p>(i));
+                        return std::abs(x.template outflow<p>(i) + y.template outflow<p>(i) + z.template outflow<p>(i));
                     });
                 };
-                block[0] = std::max(block[0], speed);
-                block[1] = std::max(block[1], has_fines_ ? divergence(std::true_type{}) : divergence(std::false_type{}));
+                const Real out = has_fines_ ? divergence(std::true_type{}) : divergence(std::false_type{});
+                block = block.cwiseMax(Eigen::Vector2d(double(out), double(speed)));
             }
     });
+    Eigen::Vector2d all = Eigen::Vector2d::Zero();
+    for (const Eigen::Vector2d& block : largest) all = all.cwiseMax(block);
+    return all;
+}
+
+void Flow::diagnose()
+{
+    const Eigen::Vector2d largest =
+        in_precision(options_.precision, [&]<class Real>(Real) { return largest_divergence_and_speed<Real>(); });
     mass_ = MassTally{};
     mass_.cell = grid_.cell;
-    for (const Eigen::Vector2d& block : largest) {
-        mass_.velocity_scale = std::max(mass_.velocity_scale, block[0]);
-        mass_.max_divergence = std::max(mass_.max_divergence, block[1] / grid_.cell);
-    }
-    max_speed_ = mass_.velocity_scale;
+    mass_.max_divergence = largest[0] / grid_.cell;
+    mass_.velocity_scale = max_speed_ = largest[1];
     balance_sides();
 }
 
 /// Keeps only `part` of the last increment in the pressure. What the step before left undone inside grains is an impulse
 /// of its own length; a step of a fiftieth of that would answer with fifty times the pressure, and hand it on.
+template <class Real>
 void Flow::relax_pressure(double part)
 {
     parallel_blocks(std::size_t(grid_.cells.z()), planes_per_block, [&](std::size_t begin, std::size_t end) {
         for (std::size_t k = begin; k < end; ++k)
             for (int j = 0; j < grid_.cells.y(); ++j) {
-                double* p = pressure_.data() + layout_.index(0, j, int(k));
-                const double* pi = work_.data() + k * poisson_->plane() + std::size_t(j) * poisson_->row();
-                for (int i = 0; i < grid_.cells.x(); ++i) p[i] -= (1.0 - part) * pi[i];
+                Real* p = pressure_.data<Real>() + layout_.index(0, j, int(k));
+                const Real* pi = work_.data<Real>() + k * poisson_->plane() + std::size_t(j) * poisson_->row();
+                for (int i = 0; i < grid_.cells.x(); ++i) p[i] -= Real(1.0 - part) * pi[i];
             }
     });
     fill_pressure_ghosts();
@@ -357,16 +362,18 @@ void Flow::project(double dt)
 {
     const auto start = std::chrono::steady_clock::now();
     apply_given_velocities(provisional_);
-    solve_increment(dt);
+    in_precision(options_.precision, [&]<class Real>(Real) { find_source<Real>(dt); });
+    poisson_->solve(work_, turned_);
     const auto solved = std::chrono::steady_clock::now();
-    correct(dt);
+    in_precision(options_.precision, [&]<class Real>(Real) { correct<Real>(dt); });
     if (!momentum_.after.allFinite())
         throw Error("flow", "the velocity is no longer finite after step " + std::to_string(times_.steps),
                     "lower time.cfl or cap the time step");
     fill_velocity_ghosts();
     fill_pressure_ghosts();
     momentum_.boundary_pressure = dt * boundary_pressure_force();
-    if (dt < 0.7 * previous_dt_) relax_pressure(dt / previous_dt_);
+    if (dt < 0.7 * previous_dt_)
+        in_precision(options_.precision, [&]<class Real>(Real) { relax_pressure<Real>(dt / previous_dt_); });
     diagnose();
     previous_dt_ = dt;
     ++times_.steps;
@@ -390,21 +397,20 @@ FlowState Flow::save() const
 
 void Flow::restore(const FlowState& state)
 {
-    const auto fits = [&](const Field& f) { return f.size() == layout_.total; };
+    const auto fits = [&](const FlowField& f) { return f.size() == layout_.total; };
     const std::size_t scalars = state.scalars.size();  // states of before there were two schemes have one less
     bool whole = fits(state.pressure) && (scalars == 16 || scalars == 17) &&
                  (state.void_fraction.empty() || fits(state.void_fraction));
     for (int axis = 0; axis < 3; ++axis) whole = whole && fits(state.velocity[axis]) && fits(state.previous_rate[axis]);
     if (!whole) throw Error("flow state", "belongs to another grid", "resume with the case that wrote it");
-    velocity_ = state.velocity;
-    pressure_ = state.pressure;
+    const Precision precision = options_.precision;
+    for (int axis = 0; axis < 3; ++axis) velocity_[axis] = state.velocity[axis].in(precision);
+    pressure_ = state.pressure.in(precision);
     const bool same_scheme = double(options_.scheme) == (scalars == 17 ? state.scalars.back() : 0.0);
-    std::array<Field, 3>& history = options_.scheme == TimeScheme::runge_kutta ? held_ : rate_;
-    if (same_scheme) history = state.previous_rate;
-    else
-        for (Field& f : history) std::fill(f.begin(), f.end(), 0.0);
+    std::array<FlowField, 3>& history = options_.scheme == TimeScheme::runge_kutta ? held_ : rate_;
+    for (int axis = 0; axis < 3; ++axis) history[axis] = same_scheme ? state.previous_rate[axis].in(precision) : make_field();
     has_fines_ = !state.void_fraction.empty();
-    if (has_fines_) porous_fields_for_writing().void_fraction = state.void_fraction;
+    if (has_fines_) porous_fields_for_writing().void_fraction = state.void_fraction.in(precision);
     const double* s = state.scalars.data();
     previous_dt_ = same_scheme ? s[0] : 0.0, step_limit_ = s[1], times_.steps = std::uint64_t(s[3]);
     const double speed = s[2];

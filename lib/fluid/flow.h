@@ -23,6 +23,7 @@
 #include <limits>
 #include <memory>
 
+#include "fluid/flow_field.h"
 #include "fluid/grid.h"
 
 namespace coral::fluid {
@@ -51,6 +52,7 @@ struct FlowOptions {
     /// Of sum_i |u_i| dt / cell for Adams-Bashforth, at most 0.6 (beyond 0.8 it is unstable); Runge-Kutta takes runge_kutta_reach times that step.
     double cfl = 0.5;
     double max_time_step = std::numeric_limits<double>::infinity();  ///< [s]
+    Precision precision = Precision::float64;                        ///< of all fields of the flow
     double first_step_factor = 0.1;  ///< the first step is this part of the stable one...
     double step_growth = 1.2;        ///< ...and grows by at most this from step to step
 };
@@ -58,10 +60,10 @@ struct FlowOptions {
 /// Fields that fines put on the fluid, written by FineCoupling. Face fields belong to the velocity component of their
 /// axis.
 struct PorousFields {
-    Field void_fraction;              ///< eps at centres, ghosts filled [-]
-    std::array<Field, 3> solid_flux;  ///< J_s on faces [m/s]
-    std::array<Field, 3> drag_rate;   ///< sum_i w b_i / (rho V) on faces [1/s]
-    std::array<Field, 3> drag_force;  ///< sum_i w F_i / (rho V) on faces, F_i the explicit force on the fines [m/s2]
+    FlowField void_fraction;              ///< eps at centres, ghosts filled [-]
+    std::array<FlowField, 3> solid_flux;  ///< J_s on faces [m/s]
+    std::array<FlowField, 3> drag_rate;   ///< sum_i w b_i / (rho V) on faces [1/s]
+    std::array<FlowField, 3> drag_force;  ///< sum_i w F_i / (rho V) on faces, F_i the explicit force on the fines [m/s2]
 };
 
 /// Momentum of the fluid and every impulse it received during the last step [N s].
@@ -104,11 +106,11 @@ struct FlowTimes {
 
 /// Everything a flow remembers between steps: restoring it continues bit for bit.
 struct FlowState {
-    std::array<Field, 3> velocity;       ///< with ghosts
-    Field pressure;                      ///< kinematic
+    std::array<FlowField, 3> velocity;  ///< with ghosts
+    FlowField pressure;                 ///< kinematic
     /// Of the last step: eps times the right-hand side (Adams-Bashforth), the acceleration by drag and forcing (Runge-Kutta)
-    std::array<Field, 3> previous_rate;
-    Field void_fraction;                 ///< empty without fines
+    std::array<FlowField, 3> previous_rate;
+    FlowField void_fraction;            ///< empty without fines
     std::vector<double> scalars;
 };
 
@@ -128,12 +130,12 @@ public:
     const FlowOptions& options() const { return options_; }
 
     /// u (axis 0), v or w of the last whole step, ghosts filled [m/s].
-    const Field& velocity(int axis) const { return velocity_[axis]; }
+    const FlowField& velocity(int axis) const { return velocity_[axis]; }
     /// Kinematic pressure at centres, ghosts filled [m2/s2]; times density it is the dynamic pressure [Pa].
-    const Field& pressure() const { return pressure_; }
+    const FlowField& pressure() const { return pressure_; }
     /// Provisional velocity between predict() and project(); forcing writes here. Valid on the unknown faces.
-    Field& provisional(int axis) { return provisional_[axis]; }
-    const Field& provisional(int axis) const { return provisional_[axis]; }
+    FlowField& provisional(int axis) { return provisional_[axis]; }
+    const FlowField& provisional(int axis) const { return provisional_[axis]; }
     /// Sets an initial velocity from a function of position and component; boundary rows are then applied. Not
     /// projected.
     template <class Function>
@@ -164,7 +166,7 @@ public:
     PorousFields& porous_fields_for_writing();
     /// For FineCoupling: takes a new void fraction (centres; ghosts are filled here), gives the old one back in its
     /// place, and books the momentum that the change moves.
-    void change_void_fraction(Field& void_fraction);
+    void change_void_fraction(FlowField& void_fraction);
     /// Void fraction on face (i, j, k) = linear index `at` of component `axis`; 1 without fines.
     double face_void_fraction(int axis, std::size_t at) const
     {
@@ -175,7 +177,7 @@ public:
 
     /// For ImmersedBodies: acceleration [m/s2] of the faces of a component, to which a step's forcing is added; null where
     /// the time scheme does not ask for it.
-    double* held_acceleration(int axis) { return held_[axis].empty() ? nullptr : held_[axis].data(); }
+    FlowField* held_acceleration(int axis) { return held_[axis].empty() ? nullptr : &held_[axis]; }
     /// Length of the step that predict() was called with [s].
     double step_length() const { return step_; }
     /// For ImmersedBodies: books an impulse that the forcing gave the fluid [N s].
@@ -207,28 +209,41 @@ private:
     /// Two planes and five rows: see sweep_component.
     std::size_t scratch_block() const { return std::size_t(2 * layout_.stride[2] + 5 * layout_.stride[1]); }
     struct Stage;
-    template <bool porous, Convection convection>
+    FlowField make_field(double value = 0.0) const { return FlowField(layout_.total, options_.precision, value); }
+    template <class Real, bool porous, Convection convection>
     void sweep_component(int axis, const Stage& stage);
     template <Convection convection>
     void sweep_all(const Stage& stage);
     void sweep(const Stage& stage);
     void start_next_stage();
     void run_stages(double dt);
-    template <bool porous, Convection convection>
+    template <class Real, bool porous, Convection convection>
+    Eigen::Vector3d boundary_flux_rate() const;
+    template <class Real, Convection convection>
     Eigen::Vector3d boundary_flux_rate() const;
     Eigen::Vector3d boundary_flux_rate() const;
+    template <class Real>
     void apply_fines(double dt);
+    template <class Real>
     void build_volume_flux();
-    void solve_increment(double dt);
+    template <class Real>
+    void find_source(double dt);
+    template <class Real>
     void correct(double dt);
+    template <class Real>
     void relax_pressure(double part);
-    double correct_row(int axis, const detail::FaceRange& range, int j, int k, double factor);
+    template <class Real>
+    double correct_row(int axis, const detail::FaceRange& range, int j, int k, double dt);
+    template <class Real>
+    Eigen::Vector2d largest_divergence_and_speed() const;
     void diagnose();
     void balance_sides();
     void fill_velocity_ghosts();
-    void fill_centre_ghosts(Field& f) const;
+    void fill_centre_ghosts(FlowField& f) const;
     void fill_pressure_ghosts();
-    void apply_given_velocities(std::array<Field, 3>& velocity) const;
+    void apply_given_velocities(std::array<FlowField, 3>& velocity) const;
+    template <class Real, class Value>
+    double sum_over_faces(int axis, const Value& value) const;
     void find_fluid_mass();
     Eigen::Vector3d total_momentum() const;
     Eigen::Vector3d boundary_pressure_force() const;
@@ -237,15 +252,15 @@ private:
     Layout layout_;
     FlowOptions options_;
     std::shared_ptr<const Poisson> poisson_;
-    std::array<Field, 3> velocity_, provisional_, rate_;  // rate_: eps R of the last predict
-    std::array<Field, 3> volume_flux_;                    // eps u on faces; empty without fines
+    std::array<FlowField, 3> velocity_, provisional_, rate_;  // rate_: eps R of the last predict
+    std::array<FlowField, 3> volume_flux_;                    // eps u on faces; empty without fines
     // With several evaluations a step; empty with one:
-    std::array<Field, 3> start_;  // u^n while velocity_ holds a stage
-    std::array<Field, 3> held_;   // acceleration by drag and forcing in the last step [m/s2]
-    Field pressure_;
-    Field work_;     // right-hand side and solution of the Poisson equation
-    Field turned_;   // the same with another axis slowest, where the solver needs it
-    Field scratch_;  // rolling fluxes of the predictor, one part per block of planes
+    std::array<FlowField, 3> start_;  // u^n while velocity_ holds a stage
+    std::array<FlowField, 3> held_;   // acceleration by drag and forcing in the last step [m/s2]
+    FlowField pressure_;
+    FlowField work_;     // right-hand side and solution of the Poisson equation
+    FlowField turned_;   // the same with another axis slowest, where the solver needs it
+    FlowField scratch_;  // rolling fluxes of the predictor, one part per block of planes
     PorousFields porous_;
     bool has_fines_ = false;
     MomentumTally momentum_;
@@ -277,8 +292,7 @@ void Flow::set_velocity(const Function& velocity)
                 for (int i = 0; i <= grid_.cells.x(); ++i) {
                     Eigen::Vector3d x(i + 0.5, j + 0.5, k + 0.5);
                     x[axis] -= 0.5;
-                    velocity_[axis][layout_.index(i, j, k)] =
-                        velocity(Eigen::Vector3d(grid_.origin + grid_.cell * x), axis);
+                    velocity_[axis].set(layout_.index(i, j, k), velocity(Eigen::Vector3d(grid_.origin + grid_.cell * x), axis));
                 }
     restart_history();
 }

@@ -30,14 +30,16 @@ void for_each_line(const Layout& layout, int axis, const Body& body)
 /// The two ghosts beyond an outlet whose last inner value is `inner`. Leaving: zero gradient. Entering: back-flow
 /// carries no momentum, so they make the upwind-biased value at the outlet zero, without shear where the scheme allows
 /// (a limited scheme needs a zero neighbour).
-void set_outlet_ghosts(double inner, bool enters, bool limited, double& first, double& second)
+template <class Real>
+void set_outlet_ghosts(Real inner, bool enters, bool limited, Real& first, Real& second)
 {
-    first = enters && limited ? 0.0 : inner;
-    second = enters ? (limited ? 2.0 * inner : 7.0 * inner) : inner;
+    first = enters && limited ? Real(0) : inner;
+    second = enters ? (limited ? 2 * inner : 7 * inner) : inner;
 }
 
 /// Ghosts of the component normal to the sides: faces 0..n.
-void fill_normal(const GridSpec& grid, const Layout& layout, int axis, bool limited, double* u)
+template <class Real>
+void fill_normal(const GridSpec& grid, const Layout& layout, int axis, bool limited, Real* u)
 {
     const int n = grid.cells[axis];
     const std::ptrdiff_t s = layout.stride[axis];
@@ -50,21 +52,22 @@ void fill_normal(const GridSpec& grid, const Layout& layout, int axis, bool limi
         for (int side = 0; side < 2; ++side) {
             const std::ptrdiff_t face = o + (side == 0 ? 0 : n) * s, out = side == 0 ? -s : s;
             if (grid.outlet(axis, side)) {
-                const bool enters = side == 0 ? u[face] > 0.0 : u[face] < 0.0;
+                const bool enters = side == 0 ? u[face] > 0 : u[face] < 0;
                 set_outlet_ghosts(u[face], enters, limited, u[face + out], u[face + 2 * out]);
             } else {
                 const Boundary& b = grid.boundary[2 * axis + side];
-                const double given = b.kind == BoundaryKind::inlet ? b.velocity[axis] : 0.0;
+                const Real given = b.kind == BoundaryKind::inlet ? Real(b.velocity[axis]) : Real(0);
                 u[face] = given;
-                for (int m = 1; m <= g; ++m) u[face + m * out] = 2.0 * given - u[face - std::min(m, n) * out];
+                for (int m = 1; m <= g; ++m) u[face + m * out] = 2 * given - u[face - std::min(m, n) * out];
             }
         }
     });
 }
 
 /// Ghosts of component `component` beyond the sides of another axis, where it sits at cell positions 0..n-1.
+template <class Real>
 void fill_tangential(const GridSpec& grid, const Layout& layout, int component, int axis, bool limited,
-                     const double* normal, double* u)
+                     const Real* normal, Real* u)
 {
     const int n = grid.cells[axis];
     const std::ptrdiff_t s = layout.stride[axis], own = layout.stride[component];
@@ -78,15 +81,15 @@ void fill_tangential(const GridSpec& grid, const Layout& layout, int component, 
             const Boundary& b = grid.boundary[2 * axis + side];
             if (b.kind == BoundaryKind::outlet) {
                 const std::ptrdiff_t face = o + (side == 0 ? 0 : n) * s;
-                const double q = normal[face] + (face >= own ? normal[face - own] : normal[face]);
-                const bool enters = side == 0 ? q > 0.0 : q < 0.0;
+                const Real q = normal[face] + (face >= own ? normal[face - own] : normal[face]);
+                const bool enters = side == 0 ? q > 0 : q < 0;
                 set_outlet_ghosts(u[inner], enters, limited, u[inner + out], u[inner + 2 * out]);
                 continue;
             }
             const bool even = b.kind == BoundaryKind::slip;
             for (int m = 0; m < g; ++m) {
-                const double mirrored = u[inner - std::min(m, n - 1) * out];
-                u[inner + (m + 1) * out] = even ? mirrored : 2.0 * b.velocity[component] - mirrored;
+                const Real mirrored = u[inner - std::min(m, n - 1) * out];
+                u[inner + (m + 1) * out] = even ? mirrored : Real(2.0 * b.velocity[component]) - mirrored;
             }
         }
     });
@@ -97,71 +100,81 @@ void fill_tangential(const GridSpec& grid, const Layout& layout, int component, 
 void Flow::fill_velocity_ghosts()
 {
     const bool limited = options_.convection == Convection::koren;
-    for (int axis = 0; axis < 3; ++axis) {
-        fill_normal(grid_, layout_, axis, limited, velocity_[axis].data());
-        for (int component = 0; component < 3; ++component)
-            if (component != axis)
-                fill_tangential(grid_, layout_, component, axis, limited, velocity_[axis].data(),
-                                velocity_[component].data());
-    }
+    in_precision(options_.precision, [&]<class Real>(Real) {
+        Real* u[3];
+        for (int axis = 0; axis < 3; ++axis) u[axis] = velocity_[axis].data<Real>();
+        for (int axis = 0; axis < 3; ++axis) {
+            fill_normal(grid_, layout_, axis, limited, u[axis]);
+            for (int component = 0; component < 3; ++component)
+                if (component != axis)
+                    fill_tangential<Real>(grid_, layout_, component, axis, limited, u[axis], u[component]);
+        }
+    });
 }
 
 /// Cells: even at sides with given velocity or outlets, periodic copies.
-void Flow::fill_centre_ghosts(Field& f) const
+void Flow::fill_centre_ghosts(FlowField& field) const
 {
-    for (int axis = 0; axis < 3; ++axis) {
-        const int n = grid_.cells[axis];
-        const std::ptrdiff_t s = layout_.stride[axis];
-        for_each_line(layout_, axis, [&](std::ptrdiff_t o) {
-            for (int m : {-2, -1, n, n + 1, n + 2}) {
-                int from = m < 0 ? std::min(-1 - m, n - 1) : std::max(2 * n - 1 - m, 0);
-                if (grid_.periodic(axis)) from = wrap(m, n);
-                f[std::size_t(o + m * s)] = f[std::size_t(o + from * s)];
-            }
-        });
-    }
+    in_precision(options_.precision, [&]<class Real>(Real) {
+        Real* f = field.data<Real>();
+        for (int axis = 0; axis < 3; ++axis) {
+            const int n = grid_.cells[axis];
+            const std::ptrdiff_t s = layout_.stride[axis];
+            for_each_line(layout_, axis, [&](std::ptrdiff_t o) {
+                for (int m : {-2, -1, n, n + 1, n + 2}) {
+                    int from = m < 0 ? std::min(-1 - m, n - 1) : std::max(2 * n - 1 - m, 0);
+                    if (grid_.periodic(axis)) from = wrap(m, n);
+                    f[o + m * s] = f[o + from * s];
+                }
+            });
+        }
+    });
 }
 
 void Flow::fill_pressure_ghosts()
 {
-    double* p = pressure_.data();
-    for (int axis = 0; axis < 3; ++axis) {
-        const int n = grid_.cells[axis];
-        const std::ptrdiff_t s = layout_.stride[axis];
-        for_each_line(layout_, axis, [&](std::ptrdiff_t o) {
-            if (grid_.periodic(axis)) {
-                p[o - s] = p[o + (n - 1) * s];
-                p[o + n * s] = p[o];
-                return;
-            }
-            for (int side = 0; side < 2; ++side) {
-                const std::ptrdiff_t inner = o + (side == 0 ? 0 : n - 1) * s, out = side == 0 ? -s : s;
-                const double on_face = grid_.boundary[2 * axis + side].pressure / options_.density;
-                p[inner + out] = grid_.outlet(axis, side) ? 2.0 * on_face - p[inner] : p[inner];
-            }
-        });
-    }
+    in_precision(options_.precision, [&]<class Real>(Real) {
+        Real* p = pressure_.data<Real>();
+        for (int axis = 0; axis < 3; ++axis) {
+            const int n = grid_.cells[axis];
+            const std::ptrdiff_t s = layout_.stride[axis];
+            for_each_line(layout_, axis, [&](std::ptrdiff_t o) {
+                if (grid_.periodic(axis)) {
+                    p[o - s] = p[o + (n - 1) * s];
+                    p[o + n * s] = p[o];
+                    return;
+                }
+                for (int side = 0; side < 2; ++side) {
+                    const std::ptrdiff_t inner = o + (side == 0 ? 0 : n - 1) * s, out = side == 0 ? -s : s;
+                    const double on_face = grid_.boundary[2 * axis + side].pressure / options_.density;
+                    p[inner + out] = grid_.outlet(axis, side) ? Real(2.0 * on_face) - p[inner] : p[inner];
+                }
+            });
+        }
+    });
 }
 
 /// Given normal velocities and periodic copies, which the divergence needs; no ghosts.
-void Flow::apply_given_velocities(std::array<Field, 3>& velocity) const
+void Flow::apply_given_velocities(std::array<FlowField, 3>& velocity) const
 {
-    for (int axis = 0; axis < 3; ++axis) {
-        const int n = grid_.cells[axis];
-        const std::ptrdiff_t s = layout_.stride[axis];
-        double* u = velocity[axis].data();
-        for_each_line(layout_, axis, [&](std::ptrdiff_t o) {
-            if (grid_.periodic(axis)) {
-                u[o + n * s] = u[o];
-                return;
-            }
-            for (int side = 0; side < 2; ++side) {
-                const Boundary& b = grid_.boundary[2 * axis + side];
-                if (b.kind != BoundaryKind::outlet)
-                    u[o + (side == 0 ? 0 : n) * s] = b.kind == BoundaryKind::inlet ? b.velocity[axis] : 0.0;
-            }
-        });
-    }
+    in_precision(options_.precision, [&]<class Real>(Real) {
+        for (int axis = 0; axis < 3; ++axis) {
+            const int n = grid_.cells[axis];
+            const std::ptrdiff_t s = layout_.stride[axis];
+            Real* u = velocity[axis].data<Real>();
+            for_each_line(layout_, axis, [&](std::ptrdiff_t o) {
+                if (grid_.periodic(axis)) {
+                    u[o + n * s] = u[o];
+                    return;
+                }
+                for (int side = 0; side < 2; ++side) {
+                    const Boundary& b = grid_.boundary[2 * axis + side];
+                    if (b.kind != BoundaryKind::outlet)
+                        u[o + (side == 0 ? 0 : n) * s] = b.kind == BoundaryKind::inlet ? Real(b.velocity[axis]) : Real(0);
+                }
+            });
+        }
+    });
 }
 
 /// sum of value(c) over the cells next to a side; c is the linear index of the cell.

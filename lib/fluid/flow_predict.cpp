@@ -25,19 +25,19 @@ double seconds_since(std::chrono::steady_clock::time_point start)
 
 }  // namespace
 
-template <bool porous>
-static ComponentView view_of(int axis, const Layout& layout, const std::array<Field, 3>& velocity,
-                             const std::array<Field, 3>& flux, const Field& eps, double viscous)
+template <class Real, bool porous>
+static ComponentView<Real> view_of(int axis, const Layout& layout, const std::array<FlowField, 3>& velocity,
+                                   const std::array<FlowField, 3>& flux, const FlowField& eps, double viscous)
 {
-    ComponentView view;
-    view.u = velocity[axis].data();
+    ComponentView<Real> view;
+    view.u = velocity[axis].data<Real>();
     for (int d = 0; d < 3; ++d) {
-        view.q[d] = porous ? flux[d].data() : velocity[d].data();
+        view.q[d] = porous ? flux[d].data<Real>() : velocity[d].data<Real>();
         view.stride[d] = layout.stride[d];
     }
-    view.eps = porous ? eps.data() : nullptr;
+    view.eps = porous ? eps.data<Real>() : nullptr;
     view.axis = axis;
-    view.viscous = viscous;
+    view.viscous = Real(viscous);
     return view;
 }
 
@@ -50,39 +50,39 @@ struct Flow::Stage {
 
 /// One component: rate = -div(flux) (+ u div q with fines), then as Stage says. Each flux is computed once: rows keep
 /// those of the low y side, planes those of the low z side.
-template <bool porous, Convection convection>
+template <class Real, bool porous, Convection convection>
 void Flow::sweep_component(int axis, const Stage& stage)
 {
     const double h = grid_.cell;
-    const ComponentView view = view_of<porous>(axis, layout_, velocity_, volume_flux_, porous_.void_fraction,
+    const ComponentView<Real> view = view_of<Real, porous>(axis, layout_, velocity_, volume_flux_, porous_.void_fraction,
                                                options_.kinematic_viscosity / h);
     const FaceRange range(grid_, axis);
     const std::ptrdiff_t sy = layout_.stride[1], sz = layout_.stride[2], own = layout_.stride[axis];
     const std::ptrdiff_t n = range.row_length();
-    const double acceleration = options_.body_acceleration[axis];
-    const double inverse_h = 1.0 / h;
-    const double* const u = view.u;
-    const double* const p = pressure_.data();
-    const double* const eps = porous ? porous_.void_fraction.data() : nullptr;
-    const double now = stage.now, before = stage.before, push = stage.push, held = stage.held;
-    const double* const hold = held != 0.0 ? held_[axis].data() : nullptr;
-    double* const out = provisional_[axis].data();
-    double* const rate = rate_[axis].data();
+    const Real acceleration = Real(options_.body_acceleration[axis]);
+    const Real inverse_h = Real(1.0 / h);
+    const Real* const u = view.u;
+    const Real* const p = pressure_.data<Real>();
+    const Real* const eps = porous ? porous_.void_fraction.data<Real>() : nullptr;
+    const Real now = Real(stage.now), before = Real(stage.before), push = Real(stage.push), held = Real(stage.held);
+    const Real* const hold = stage.held != 0.0 ? held_[axis].data<Real>() : nullptr;
+    Real* const out = provisional_[axis].data<Real>();
+    Real* const rate = rate_[axis].data<Real>();
     constexpr bool advective = porous && convection != Convection::none;
     const std::size_t block_size = scratch_block();
     advective_sum_[axis] = parallel_sum(range.planes(), planes_per_block, 0.0, [&](std::size_t begin, std::size_t end) {
-        double* __restrict gz =
-            scratch_.data() + begin / planes_per_block * block_size;  // momentum fluxes through low sides
-        double* __restrict qz = gz + sz;                              // volume fluxes, only with fines
-        double* __restrict gy = qz + sz;
-        double* __restrict qy = gy + sy;
-        double* __restrict gx = qy + sy;
-        double* __restrict qx = gx + sy;
-        double* __restrict transported = qx + sy;
+        Real* __restrict gz =
+            scratch_.data<Real>() + begin / planes_per_block * block_size;  // momentum fluxes through low sides
+        Real* __restrict qz = gz + sz;                              // volume fluxes, only with fines
+        Real* __restrict gy = qz + sz;
+        Real* __restrict qy = gy + sy;
+        Real* __restrict gx = qy + sy;
+        Real* __restrict qx = gx + sy;
+        Real* __restrict transported = qx + sy;
         double sum = 0.0;
         const int k_begin = range.low.z() + int(begin), k_end = range.low.z() + int(end);
-        const auto start_row = [&](int direction, std::ptrdiff_t f0, std::ptrdiff_t count, double* __restrict g,
-                                   double* __restrict q) {
+        const auto start_row = [&](int direction, std::ptrdiff_t f0, std::ptrdiff_t count, Real* __restrict g,
+                                   Real* __restrict q) {
 #pragma GCC ivdep
             for (std::ptrdiff_t i = 0; i < count; ++i) g[i] = low_flux<porous, convection>(view, direction, f0 + i);
             if constexpr (advective) {
@@ -97,26 +97,26 @@ void Flow::sweep_component(int axis, const Stage& stage)
             for (int j = range.low.y(); j < range.high.y(); ++j) {
                 const auto f0 = std::ptrdiff_t(layout_.index(range.low.x(), j, k));
                 start_row(0, f0, n + 1, gx, qx);
-                double* __restrict g = gz + j * sy;
-                double* __restrict q = qz + j * sy;
+                Real* __restrict g = gz + j * sy;
+                Real* __restrict q = qz + j * sy;
 #pragma GCC ivdep
                 for (std::ptrdiff_t i = 0; i < n; ++i) {
                     const std::ptrdiff_t f = f0 + i;
-                    const double high_y = low_flux<porous, convection>(view, 1, f + sy);
-                    const double high_z = low_flux<porous, convection>(view, 2, f + sz);
-                    double r = ((gx[i] - gx[i + 1]) + (gy[i] - high_y) + (g[i] - high_z)) * inverse_h;
+                    const Real high_y = low_flux<porous, convection>(view, 1, f + sy);
+                    const Real high_z = low_flux<porous, convection>(view, 2, f + sz);
+                    Real r = ((gx[i] - gx[i + 1]) + (gy[i] - high_y) + (g[i] - high_z)) * inverse_h;
                     gy[i] = high_y;
                     g[i] = high_z;
                     if constexpr (advective) {
-                        const double q_y = low_volume_flux(view, 1, f + sy), q_z = low_volume_flux(view, 2, f + sz);
+                        const Real q_y = low_volume_flux(view, 1, f + sy), q_z = low_volume_flux(view, 2, f + sz);
                         transported[i] = u[f] * ((qx[i + 1] - qx[i]) + (q_y - qy[i]) + (q_z - q[i]));
                         qy[i] = q_y;
                         q[i] = q_z;
                         r += transported[i] * inverse_h;
                     }
-                    const double ab = now * r - before * rate[f];
+                    const Real ab = now * r - before * rate[f];
                     rate[f] = r;
-                    const double force = porous ? ab / (0.5 * (eps[f] + eps[f - own])) : ab;
+                    const Real force = porous ? ab / (Real(0.5) * (eps[f] + eps[f - own])) : ab;
                     out[f] = u[f] + force - push * ((p[f] - p[f - own]) * inverse_h - acceleration);
                 }
                 if (hold) {
@@ -138,18 +138,20 @@ void Flow::sweep_component(int axis, const Stage& stage)
 template <Convection convection>
 void Flow::sweep_all(const Stage& stage)
 {
-    for (int axis = 0; axis < 3; ++axis) {
-        if (has_fines_)
-            sweep_component<true, convection>(axis, stage);
-        else
-            sweep_component<false, convection>(axis, stage);
-    }
+    in_precision(options_.precision, [&]<class Real>(Real) {
+        for (int axis = 0; axis < 3; ++axis) {
+            if (has_fines_)
+                sweep_component<Real, true, convection>(axis, stage);
+            else
+                sweep_component<Real, false, convection>(axis, stage);
+        }
+    });
 }
 
 /// Explicit terms of one stage, velocity_ to provisional_, and their part of the tallies.
 void Flow::sweep(const Stage& stage)
 {
-    if (has_fines_) build_volume_flux();
+    if (has_fines_) in_precision(options_.precision, [&]<class Real>(Real) { build_volume_flux<Real>(); });
     const Eigen::Vector3d rate = boundary_flux_rate(), advective_before = advective_sum_;
     momentum_.boundary_flux += stage.now * rate - stage.before * flux_rate_;
     flux_rate_ = rate;
@@ -196,35 +198,36 @@ void Flow::run_stages(double dt)
     sweep({3.0 / 4.0 * dt, 5.0 / 12.0 * dt, dt / 3.0, -(first + second)});
     velocity_.swap(start_);
     if (has_fines_) return;  // apply_fines writes every face
-    for (Field& f : held_) std::fill(f.begin(), f.end(), 0.0);
+    for (FlowField& f : held_) f.fill(0.0);
 }
 
 /// eps u on every face, ghosts included.
+template <class Real>
 void Flow::build_volume_flux()
 {
     if (volume_flux_[0].empty())
-        for (Field& f : volume_flux_) f = layout_.make_field();
-    const double* eps = porous_.void_fraction.data();
+        for (FlowField& f : volume_flux_) f = make_field();
+    const Real* eps = porous_.void_fraction.data<Real>();
     const auto planes = layout_.total / std::size_t(layout_.stride[2]);
     parallel_blocks(planes, planes_per_block, [&](std::size_t begin, std::size_t end) {
         for (int axis = 0; axis < 3; ++axis) {
             const std::ptrdiff_t s = layout_.stride[axis];
             const std::ptrdiff_t first = std::max(std::ptrdiff_t(begin) * layout_.stride[2], s);
-            const double* u = velocity_[axis].data();
-            double* q = volume_flux_[axis].data();
+            const Real* u = velocity_[axis].data<Real>();
+            Real* q = volume_flux_[axis].data<Real>();
             for (std::ptrdiff_t f = first; f < std::ptrdiff_t(end) * layout_.stride[2]; ++f)
-                q[f] = 0.5 * (eps[f] + eps[f - s]) * u[f];
+                q[f] = Real(0.5) * (eps[f] + eps[f - s]) * u[f];
         }
     });
 }
 
 /// Momentum entering the fluid through the domain's sides per time [N], with the same fluxes as the sweep.
-template <bool porous, Convection convection>
+template <class Real, bool porous, Convection convection>
 Eigen::Vector3d Flow::boundary_flux_rate() const
 {
     Eigen::Vector3d total = Eigen::Vector3d::Zero();
     for (int axis = 0; axis < 3; ++axis) {
-        const ComponentView view = view_of<porous>(axis, layout_, velocity_, volume_flux_, porous_.void_fraction,
+        const ComponentView<Real> view = view_of<Real, porous>(axis, layout_, velocity_, volume_flux_, porous_.void_fraction,
                                                    options_.kinematic_viscosity / grid_.cell);
         const FaceRange range(grid_, axis);
         for (int d = 0; d < 3; ++d) {
@@ -238,11 +241,11 @@ Eigen::Vector3d Flow::boundary_flux_rate() const
                 for (c[b] = range.low[b]; c[b] < range.high[b]; ++c[b])
                     for (c[a] = range.low[a]; c[a] < range.high[a]; ++c[a]) {
                         const auto f = std::ptrdiff_t(layout_.index(c.x(), c.y(), c.z()));
-                        double flux = low_flux<porous, convection>(view, d, f);
+                        double flux = double(low_flux<porous, convection>(view, d, f));
                         // half of the control volume of an outlet face is outside: the flux at the face is the mean of
                         // both sides
                         if (d == axis && grid_.outlet(d, side))
-                            flux = 0.5 * (flux + low_flux<porous, convection>(view, d, side == 0 ? f + s : f - s));
+                            flux = 0.5 * (flux + double(low_flux<porous, convection>(view, d, side == 0 ? f + s : f - s)));
                         const double weight = axis == d ? 1.0 : detail::face_weight(grid_, axis, c[axis]);
                         sum += weight * flux;
                     }
@@ -253,61 +256,69 @@ Eigen::Vector3d Flow::boundary_flux_rate() const
     return options_.density * grid_.cell * grid_.cell * total;
 }
 
+template <class Real, Convection convection>
 Eigen::Vector3d Flow::boundary_flux_rate() const
 {
-    switch (options_.convection) {
-        case Convection::none:
-            return has_fines_ ? boundary_flux_rate<true, Convection::none>()
-                              : boundary_flux_rate<false, Convection::none>();
-        case Convection::koren:
-            return has_fines_ ? boundary_flux_rate<true, Convection::koren>()
-                              : boundary_flux_rate<false, Convection::koren>();
-        case Convection::up3:
-            break;
-    }
-    return has_fines_ ? boundary_flux_rate<true, Convection::up3>() : boundary_flux_rate<false, Convection::up3>();
+    return has_fines_ ? boundary_flux_rate<Real, true, convection>() : boundary_flux_rate<Real, false, convection>();
+}
+
+Eigen::Vector3d Flow::boundary_flux_rate() const
+{
+    return in_precision(options_.precision, [&]<class Real>(Real) {
+        switch (options_.convection) {
+            case Convection::none:
+                return boundary_flux_rate<Real, Convection::none>();
+            case Convection::koren:
+                return boundary_flux_rate<Real, Convection::koren>();
+            case Convection::up3:
+                break;
+        }
+        return boundary_flux_rate<Real, Convection::up3>();
+    });
 }
 
 /// Repairs the momentum moved by the porosity field with a uniform acceleration, then applies the drag of the fines:
 /// eps u* <- eps u* + dt (A u^n - B - A u*)   [docs/numerics.md, eq. 5, with A = eps K, B = eps G].
+template <class Real>
 void Flow::apply_fines(double dt)
 {
+    const Real step = Real(dt);
     const double volume = options_.density * grid_.cell_volume();
     momentum_.porosity_defect = pending_defect_ + advective_impulse_;
     pending_defect_.setZero();
     for (int axis = 0; axis < 3; ++axis) {
         const FaceRange range(grid_, axis);
         const std::ptrdiff_t own = layout_.stride[axis];
-        const double repair = fluid_mass_[axis] > 0.0 ? -momentum_.porosity_defect[axis] / fluid_mass_[axis] : 0.0;
-        const double* eps = porous_.void_fraction.data();
-        const double* A = porous_.drag_rate[axis].data();
-        const double* B = porous_.drag_force[axis].data();
-        const double* p = pressure_.data();
-        const double* u = velocity_[axis].data();
-        double* __restrict us = provisional_[axis].data();
-        double* __restrict hold = held_[axis].empty() ? nullptr : held_[axis].data();
+        const Real repair = Real(fluid_mass_[axis] > 0.0 ? -momentum_.porosity_defect[axis] / fluid_mass_[axis] : 0.0);
+        const Real* eps = porous_.void_fraction.data<Real>();
+        const Real* A = porous_.drag_rate[axis].data<Real>();
+        const Real* B = porous_.drag_force[axis].data<Real>();
+        const Real* p = pressure_.data<Real>();
+        const Real* u = velocity_[axis].data<Real>();
+        Real* __restrict us = provisional_[axis].data<Real>();
+        Real* __restrict hold = held_[axis].empty() ? nullptr : held_[axis].data<Real>();
         using Pair = Eigen::Vector2d;  // drag on the fluid, pressure gradient on the fines
         const Pair sums =
             parallel_sum(range.planes(), planes_per_block, Pair(0.0, 0.0), [&](std::size_t begin, std::size_t end) {
                 Pair sum(0.0, 0.0);
                 const std::ptrdiff_t n = range.row_length();
-                std::vector<double> drag(static_cast<std::size_t>(n)), fines(drag), unheld(drag);
-                double *const drag_row = drag.data(), *const fines_row = fines.data();
+                std::vector<Real> drag(static_cast<std::size_t>(n)), fines(drag), unheld(drag);
+                Real *const drag_row = drag.data(), *const fines_row = fines.data();
                 const auto lanes = [](std::ptrdiff_t m, const auto& v) { return detail::lane_sum(m, v); };
                 for (int k = range.low.z() + int(begin); k < range.low.z() + int(end); ++k)
                     for (int j = range.low.y(); j < range.high.y(); ++j) {
                         const auto f0 = std::ptrdiff_t(layout_.index(range.low.x(), j, k));
-                        double* __restrict hold_row = hold ? hold + f0 : unheld.data();
+                        Real* __restrict hold_row = hold ? hold + f0 : unheld.data();
 #pragma GCC ivdep
                         for (std::ptrdiff_t i = 0; i < n; ++i) {
                             const std::ptrdiff_t f = f0 + i;
-                            const double face_eps = 0.5 * (eps[f] + eps[f - own]);
-                            const double start = us[f] + repair;
-                            const double change = (A[f] * (u[f] - start) - B[f]) / (face_eps + dt * A[f]);
-                            us[f] = start + dt * change;
+                            const Real face_eps = Real(0.5) * (eps[f] + eps[f - own]);
+                            const Real start = us[f] + repair;
+                            const Real change = (A[f] * (u[f] - start) - B[f]) / (face_eps + step * A[f]);
+                            us[f] = start + step * change;
                             hold_row[i] = change;
-                            drag_row[i] = face_eps * dt * change;
-                            fines_row[i] = (face_eps - 1.0) * (p[f] - p[f - own]);
+                            drag_row[i] = face_eps * step * change;
+                            fines_row[i] = (face_eps - 1) * (p[f] - p[f - own]);
                         }
                         sum[0] += detail::weighted_row(grid_, axis, range, j, k, lanes,
                                                        [&](std::ptrdiff_t i) { return drag_row[i]; });
@@ -335,7 +346,7 @@ void Flow::predict(double dt)
     const auto swept = std::chrono::steady_clock::now();
     times_.predictor += std::chrono::duration<double>(swept - start).count();
     if (has_fines_) {
-        apply_fines(dt);
+        in_precision(options_.precision, [&]<class Real>(Real) { apply_fines<Real>(dt); });
         times_.fines += seconds_since(swept);
     }
 }

@@ -128,22 +128,22 @@ void weigh_runs(const std::vector<SolidRun>& runs, const Carrier& carrier, Vecto
 }
 
 /// Mean void fraction of the two cells of a face.
-template <bool porous>
-double face_void(const double* eps, std::ptrdiff_t own, std::size_t at)
+template <bool porous, class Real>
+double face_void(const Real* eps, std::ptrdiff_t own, std::size_t at)
 {
-    if constexpr (porous) return 0.5 * (eps[at] + eps[std::ptrdiff_t(at) - own]);
+    if constexpr (porous) return 0.5 * double(eps[at] + eps[std::ptrdiff_t(at) - own]);
     return 1.0;
 }
 
 /// Rows and cut faces lie scattered in fields that do not fit the cache: what the loops will need is asked for in time.
-template <bool porous>
+template <bool porous, class Real>
 class Prefetch {
 public:
-    Prefetch(const double* us, const double* eps, std::ptrdiff_t own) : us_(us), eps_(eps), own_(own) {}
+    Prefetch(const Real* us, const Real* eps, std::ptrdiff_t own) : us_(us), eps_(eps), own_(own) {}
     void row(const std::vector<SolidRun>& runs, std::size_t now) const
     {
         constexpr std::size_t ahead = 4;
-        constexpr int line = 8;
+        constexpr int line = 64 / sizeof(Real);
         if (now + ahead >= runs.size()) return;
         const SolidRun& run = runs[now + ahead];
         for (int l = 0; l < run.length + line - 1; l += line) face(run.at + std::uint32_t(std::min(l, run.length - 1)));
@@ -158,20 +158,20 @@ public:
     }
 
 private:
-    const double *us_, *eps_;
+    const Real *us_, *eps_;
     std::ptrdiff_t own_;
 };
 constexpr int cuts_ahead = 24;
 
 /// Reaction of the solid rows of one component; sums of (u* - u_s) eps, not yet times rho V / dt.
-template <int c, bool porous>
+template <class Real, int c, bool porous>
 void measure_runs(const Flow& flow, const std::vector<SolidRun>& runs, const Carrier& carrier, FluidAction& action)
 {
-    const double* us = flow.provisional(c).data();
-    const double* eps = porous ? flow.porous_fields().void_fraction.data() : nullptr;
+    const Real* us = flow.provisional(c).data<Real>();
+    const Real* eps = porous ? flow.porous_fields().void_fraction.data<Real>() : nullptr;
     const std::ptrdiff_t own = flow.layout().stride[c];
     const double slope = row_slope<c>(carrier);
-    const Prefetch<porous> prefetch(us, eps, own);
+    const Prefetch<porous, Real> prefetch(us, eps, own);
     double force = 0.0;
     Vector3d torque = Vector3d::Zero();
     for (std::size_t n = 0; n < runs.size(); ++n) {
@@ -179,13 +179,13 @@ void measure_runs(const Flow& flow, const std::vector<SolidRun>& runs, const Car
         const SolidRun& run = runs[n];
         const Vector3d r = carrier.arm(c, run.i, run.j, run.k);
         const double body = carrier.component_velocity(c, r);
-        const double *row = us + run.at, *high = porous ? eps + run.at : nullptr, *low = porous ? high - own : nullptr;
+        const Real *row = us + run.at, *high = porous ? eps + run.at : nullptr, *low = porous ? high - own : nullptr;
         const int length = run.length;
         double f = 0.0, fx = 0.0;
 #pragma omp simd reduction(+ : f, fx)
         for (int l = 0; l < length; ++l) {
-            double part = row[l] - (body + slope * l);
-            if constexpr (porous) part *= 0.5 * (high[l] + low[l]);
+            double part = double(row[l]) - (body + slope * l);
+            if constexpr (porous) part *= 0.5 * double(high[l] + low[l]);
             f += part;
             if constexpr (c != 0) fx += l * part;
         }
@@ -197,13 +197,13 @@ void measure_runs(const Flow& flow, const std::vector<SolidRun>& runs, const Car
 }
 
 /// The same for cut faces, whose weights are found here.
-template <int c, bool porous>
+template <class Real, int c, bool porous>
 void measure_cuts(const Flow& flow, const ForcingOptions& options, double dt, OwnFaces& faces, const Carrier& carrier,
                   FluidAction& action)
 {
     constexpr int a = (c + 1) % 3, b = (c + 2) % 3;
-    const double* us = flow.provisional(c).data();
-    const double* eps = porous ? flow.porous_fields().void_fraction.data() : nullptr;
+    const Real* us = flow.provisional(c).data<Real>();
+    const Real* eps = porous ? flow.porous_fields().void_fraction.data<Real>() : nullptr;
     const std::ptrdiff_t own = flow.layout().stride[c];
     const ForcingRate rate(options, dt, flow.options().kinematic_viscosity, carrier.cell);
     const Vector3d first = carrier.arm(c, 0, 0, 0);
@@ -213,11 +213,11 @@ void measure_cuts(const Flow& flow, const ForcingOptions& options, double dt, Ow
     float* weight = faces.weight.data();
     const int count = int(faces.at.size());
     double force = 0.0, force_a = 0.0, force_b = 0.0, total = 0.0, total_aa = 0.0, total_ab = 0.0, total_bb = 0.0;
-    const Prefetch<porous> prefetch(us, eps, own);
+    const Prefetch<porous, Real> prefetch(us, eps, own);
     for (int n = 0; n < count; ++n) {
         if (n + cuts_ahead < count) prefetch.face(at[n + cuts_ahead]);
         const double ra = first[a] + carrier.cell * place_a[n], rb = first[b] + carrier.cell * place_b[n];
-        const double slip = us[at[n]] - (carrier.velocity[c] + carrier.spin[a] * rb - carrier.spin[b] * ra);
+        const double slip = double(us[at[n]]) - (carrier.velocity[c] + carrier.spin[a] * rb - carrier.spin[b] * ra);
         weight[n] = float(rate.weight(double(fraction[n]), slip));
         const double mass = double(weight[n]) * face_void<porous>(eps, own, at[n]);
         const double f = mass * slip;
@@ -232,33 +232,34 @@ void measure_cuts(const Flow& flow, const ForcingOptions& options, double dt, Ow
 }
 
 /// u* <- u* + w (u_s - u*) on the faces of one component. \returns the sum of eps times the change
-template <int c, bool porous>
+template <class Real, int c, bool porous>
 double force_faces(Flow& flow, const OwnFaces& faces, const Carrier& carrier)
 {
     constexpr int a = (c + 1) % 3, b = (c + 2) % 3;
-    double* us = flow.provisional(c).data();
-    const double* eps = porous ? flow.porous_fields().void_fraction.data() : nullptr;
-    double* hold = flow.held_acceleration(c);
+    Real* us = flow.provisional(c).data<Real>();
+    const Real* eps = porous ? flow.porous_fields().void_fraction.data<Real>() : nullptr;
+    FlowField* const held = flow.held_acceleration(c);
+    Real* hold = held ? held->data<Real>() : nullptr;
     const double per_step = 1.0 / flow.step_length();
     const std::ptrdiff_t own = flow.layout().stride[c];
     const double slope = row_slope<c>(carrier);
     double impulse = 0.0;
-    const Prefetch<porous> prefetch(us, eps, own);
+    const Prefetch<porous, Real> prefetch(us, eps, own);
     for (std::size_t n = 0; n < faces.runs.size(); ++n) {
         prefetch.row(faces.runs, n);
         const SolidRun& run = faces.runs[n];
         const double body = carrier.component_velocity(c, carrier.arm(c, run.i, run.j, run.k));
-        double* row = us + run.at;
-        const double *high = porous ? eps + run.at : nullptr, *low = porous ? high - own : nullptr;
+        Real* row = us + run.at;
+        const Real *high = porous ? eps + run.at : nullptr, *low = porous ? high - own : nullptr;
         const int length = run.length;
         if (hold)
-            for (int l = 0; l < length; ++l) hold[run.at + l] += per_step * (body + slope * l - row[l]);
+            for (int l = 0; l < length; ++l) hold[run.at + l] += Real(per_step * (body + slope * l - double(row[l])));
         double sum = 0.0;
 #pragma omp simd reduction(+ : sum)
         for (int l = 0; l < length; ++l) {
-            const double solid = body + slope * l;
-            double change = solid - row[l];
-            if constexpr (porous) change *= 0.5 * (high[l] + low[l]);
+            const Real solid = Real(body + slope * l);
+            double change = double(solid - row[l]);
+            if constexpr (porous) change *= 0.5 * double(high[l] + low[l]);
             sum += change;
             row[l] = solid;
         }
@@ -273,9 +274,10 @@ double force_faces(Flow& flow, const OwnFaces& faces, const Carrier& carrier)
         if (n + cuts_ahead < count) prefetch.face(at[n + cuts_ahead]);
         const double ra = first[a] + carrier.cell * place_a[n], rb = first[b] + carrier.cell * place_b[n];
         const double solid = carrier.velocity[c] + carrier.spin[a] * rb - carrier.spin[b] * ra;
-        const double change = double(faces.weight[std::size_t(n)]) * (solid - us[at[n]]);
-        us[at[n]] += change;
-        if (hold) hold[at[n]] += per_step * change;
+        const Real old = us[at[n]];
+        us[at[n]] = Real(double(old) + double(faces.weight[std::size_t(n)]) * (solid - double(old)));
+        const double change = double(us[at[n]]) - double(old);
+        if (hold) hold[at[n]] += Real(per_step * change);
         sum += face_void<porous>(eps, own, at[n]) * change;
     }
     return impulse + sum;
@@ -349,15 +351,14 @@ std::span<const FluidAction> ImmersedBodies::measure(Flow& flow, double dt, std:
         action.forced_inertia = body.run_inertia;
         for_each_component([&](auto component) {
             constexpr int c = component;
-            if (flow.porous()) {
-                measure_runs<c, true>(flow, body.own[c].runs, carrier, action);
+            const auto add = [&]<class Real, bool porous>() {
+                measure_runs<Real, c, porous>(flow, body.own[c].runs, carrier, action);
                 mean_slip[b][c] = action.force[c] / std::max(1.0, body.run_mass[c]);
-                measure_cuts<c, true>(flow, options_, dt, body.own[c], carrier, action);
-            } else {
-                measure_runs<c, false>(flow, body.own[c].runs, carrier, action);
-                mean_slip[b][c] = action.force[c] / std::max(1.0, body.run_mass[c]);
-                measure_cuts<c, false>(flow, options_, dt, body.own[c], carrier, action);
-            }
+                measure_cuts<Real, c, porous>(flow, options_, dt, body.own[c], carrier, action);
+            };
+            in_precision(flow.options().precision, [&]<class Real>(Real) {
+                flow.porous() ? add.template operator()<Real, true>() : add.template operator()<Real, false>();
+            });
         });
         actions_[b] = action;
     });
@@ -404,8 +405,10 @@ void ImmersedBodies::apply(Flow& flow, std::span<const RigidMotion> motions)
         Vector3d part = Vector3d::Zero();
         for_each_component([&](auto component) {
             constexpr int c = component;
-            part[c] = flow.porous() ? force_faces<c, true>(flow, body.own[c], carrier)
-                                    : force_faces<c, false>(flow, body.own[c], carrier);
+            part[c] = in_precision(flow.options().precision, [&]<class Real>(Real) {
+                return flow.porous() ? force_faces<Real, c, true>(flow, body.own[c], carrier)
+                                     : force_faces<Real, c, false>(flow, body.own[c], carrier);
+            });
         });
         impulses_[b] = mass * part;
         return part;
@@ -414,10 +417,11 @@ void ImmersedBodies::apply(Flow& flow, std::span<const RigidMotion> motions)
         constexpr int c = component;
         for (const Shared& shared : shared_[c]) {
             const std::span<const Claim> claims(claims_[c].data() + shared.first, claims_[c].data() + shared.last);
-            double& us = flow.provisional(c)[shared.at];
-            const double change = shared.weight * (shared_velocity<c>(claims, carriers) - us);
-            us += change;
-            if (double* hold = flow.held_acceleration(c)) hold[shared.at] += change / flow.step_length();
+            FlowField& us = flow.provisional(c);
+            const double old = us[shared.at];
+            us.set(shared.at, old + shared.weight * (shared_velocity<c>(claims, carriers) - old));
+            const double change = us[shared.at] - old;
+            if (FlowField* hold = flow.held_acceleration(c)) hold->set(shared.at, (*hold)[shared.at] + change / flow.step_length());
             const double given = flow.face_void_fraction(c, shared.at) * change;
             impulse[c] += given;
             for (const Claim& claim : claims) impulses_[claim.body][c] += mass * claim.part * given;

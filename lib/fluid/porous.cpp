@@ -28,6 +28,11 @@ Eigen::Map<const Lanes> lanes_at(const double* p)
     return Eigen::Map<const Lanes>(p);
 }
 
+Lanes lanes_at(const float* p)
+{
+    return Eigen::Map<const Eigen::Array4f>(p).cast<double>();
+}
+
 }  // namespace
 
 /// fields[v][c] += w_ic value(i)[v] for all particles: each slab of planes takes its rows from all particles in order, so
@@ -141,16 +146,22 @@ void FineCoupling::deposit_volume(Flow& flow, std::span<const double> volumes, s
     own_solid_.resize(count_);
     for (std::size_t p = 0; p < count_; ++p) own_solid_[p] = own_overlap_[p] * volumes[p] * inverse;
     PorousFields& fields = flow.porous_fields_for_writing();
-    find_void_fraction();
-    parallel_blocks(std::size_t(grid_.cells.z()) + 1, planes_per_slab, [&](std::size_t begin, std::size_t end) {
-        for (int k = int(begin); k < int(end); ++k)
-            for (int d = 0; d < 3; ++d)
-                if (k < grid_.cells.z() || d == 2) deposit_flux(d, k, fields.solid_flux[std::size_t(d)]);
+    if (void_fraction_.empty()) void_fraction_ = FlowField(layout_.total, flow.options().precision, 1.0);
+    in_precision(flow.options().precision, [&]<class Real>(Real) {
+        find_void_fraction<Real>();
+        Real* flux[3];
+        for (std::size_t d = 0; d < 3; ++d) flux[d] = fields.solid_flux[d].data<Real>();
+        parallel_blocks(std::size_t(grid_.cells.z()) + 1, planes_per_slab, [&](std::size_t begin, std::size_t end) {
+            for (int k = int(begin); k < int(end); ++k)
+                for (int d = 0; d < 3; ++d)
+                    if (k < grid_.cells.z() || d == 2) deposit_flux(d, k, flux[d]);
+        });
     });
     flow.change_void_fraction(void_fraction_);
 }
 
 /// Void fraction, and where it stops at the smallest allowed the part of the solid that counts.
+template <class Real>
 void FineCoupling::find_void_fraction()
 {
     const double most = 1.0 - options_.smallest_void_fraction;
@@ -160,8 +171,8 @@ void FineCoupling::find_void_fraction()
             for (int j = 0; j < grid_.cells.y(); ++j) {
                 const std::size_t c0 = layout_.index(0, j, int(k));
                 const double* solid = cell_fields_[0].data() + c0;
-                double* __restrict open = void_fraction_.data() + c0;
-                for (std::ptrdiff_t i = 0; i < n; ++i) open[i] = 1.0 - std::min(solid[i], most);
+                Real* __restrict open = void_fraction_.data<Real>() + c0;
+                for (std::ptrdiff_t i = 0; i < n; ++i) open[i] = Real(1.0 - std::min(solid[i], most));
                 char& clipped = clipped_[k * std::size_t(grid_.cells.y()) + std::size_t(j)];
                 const bool clips = detail::lane_max(n, [&](std::ptrdiff_t i) { return solid[i]; }) > most;
                 if (clips || clipped != 0)
@@ -175,7 +186,8 @@ void FineCoupling::find_void_fraction()
 
 /// Solid flux on plane k of the faces of one component: mean of the two cells; none through walls and inlets, that of the
 /// cell through outlets.
-void FineCoupling::deposit_flux(int d, int k, Field& flux) const
+template <class Real>
+void FineCoupling::deposit_flux(int d, int k, Real* flux) const
 {
     const Vector3i faces = grid_.cells + Vector3i::Unit(d);
     const int n = grid_.cells[d];
@@ -197,24 +209,25 @@ void FineCoupling::deposit_flux(int d, int k, Field& flux) const
     for (int j = 0; j < faces.y(); ++j) {
         const auto f0 = std::ptrdiff_t(layout_.index(0, j, k));
         std::ptrdiff_t low = f0, high = f0;
-        double* __restrict J = flux.data() + f0;
+        Real* __restrict J = flux + f0;
         if (d == 0) {
-            for (int i = 1; i < n; ++i) J[i] = 0.5 * (q[f0 + i - 1] + q[f0 + i]);
+            for (int i = 1; i < n; ++i) J[i] = Real(0.5 * (q[f0 + i - 1] + q[f0 + i]));
             for (int i : {0, n}) {
                 const double weight = sides(i, f0 + i, low, high);
-                J[i] = weight * (q[low] + q[high]);
+                J[i] = Real(weight * (q[low] + q[high]));
             }
         } else {
             const double weight = sides(d == 1 ? j : k, f0, low, high);
-            for (int i = 0; i < faces.x(); ++i) J[i] = weight * (q[low + i] + q[high + i]);
+            for (int i = 0; i < faces.x(); ++i) J[i] = Real(weight * (q[low + i] + q[high + i]));
         }
     }
 }
 
 /// Kernel mean of the centred pressure gradient, which is the mean of the two face gradients that the flow uses.
+template <class Real>
 void FineCoupling::gather_pressure_gradient(const Flow& flow, std::span<FeltFlow> felt) const
 {
-    const double* p = flow.pressure().data();
+    const Real* p = flow.pressure().data<Real>();
     const std::ptrdiff_t sy = layout_.stride[1], sz = layout_.stride[2];
     parallel_blocks(volume_.size(), 1, [&](std::size_t chunk, std::size_t) {
         const Weights& w = volume_[chunk];
@@ -224,7 +237,7 @@ void FineCoupling::gather_pressure_gradient(const Flow& flow, std::span<FeltFlow
             for (std::size_t r = w.first_row[particle]; r < w.first_row[particle + 1]; ++r) {
                 const Row& row = w.rows[r];
                 for (int l = 0; l < row.length; l += 4) {
-                    const double* at = p + row.start + l;
+                    const Real* at = p + row.start + l;
                     Lanes here = lanes_at(weight + l);
                     if (any_clipped_) here *= lanes_at(clip_.data() + row.start + l);
                     gx += here * (lanes_at(at + 1) - lanes_at(at - 1));
@@ -241,16 +254,24 @@ void FineCoupling::gather_pressure_gradient(const Flow& flow, std::span<FeltFlow
 
 void FineCoupling::feel(const Flow& flow, std::span<FeltFlow> felt) const
 {
-    gather_pressure_gradient(flow, felt);
+    in_precision(flow.options().precision, [&]<class Real>(Real) {
+        gather_pressure_gradient<Real>(flow, felt);
+        average_felt<Real>(flow, felt);
+    });
+}
+
+template <class Real>
+void FineCoupling::average_felt(const Flow& flow, std::span<FeltFlow> felt) const
+{
     const int n = grid_.cells.x();
     const auto fill_flow = [&](int j, int k, double* const* rows) {
         const std::size_t c0 = layout_.index(0, j, k);
-        const double* eps = flow.porous_fields().void_fraction.data() + c0;
+        const Real* eps = flow.porous_fields().void_fraction.data<Real>() + c0;
         std::copy(eps, eps + n, rows[0]);
         for (int d = 0; d < 3; ++d) {
-            const double *low = flow.velocity(d).data() + c0, *high = low + layout_.stride[d];
+            const Real *low = flow.velocity(d).data<Real>() + c0, *high = low + layout_.stride[d];
             double* __restrict row = rows[d + 1];
-            for (int i = 0; i < n; ++i) row[i] = 0.5 * eps[i] * (low[i] + high[i]);
+            for (int i = 0; i < n; ++i) row[i] = 0.5 * double(eps[i]) * (double(low[i]) + double(high[i]));
         }
     };
     const auto put = [&](std::size_t i, const auto& sums) {
@@ -272,12 +293,12 @@ void FineCoupling::feel(const Flow& flow, std::span<FeltFlow> felt) const
     }
     average_blocks(std::span<Field, 7>(block_fields_), [&](int j, int k, double* const* rows) {
         fill_flow(j, k, rows);
-        const double* at = flow.pressure().data() + layout_.index(0, j, k);
+        const Real* at = flow.pressure().data<Real>() + layout_.index(0, j, k);
         const double scale = 0.5 / grid_.cell;
         for (int d = 0; d < 3; ++d) {
             const std::ptrdiff_t s = layout_.stride[d];
             double* __restrict row = rows[d + 4];
-            for (int i = 0; i < n; ++i) row[i] = scale * (at[i + s] - at[i - s]);
+            for (int i = 0; i < n; ++i) row[i] = scale * (double(at[i + s]) - double(at[i - s]));
         }
     });
     gather(felt_, std::span<const Field, 7>(block_fields_), felt_sums_);
@@ -314,7 +335,15 @@ void FineCoupling::deposit_drag(Flow& flow, std::span<const double> coefficients
     scatter(felt_, blocks_, blocks, [&](std::size_t p) {
         return Vector4d(scale * Vector4d(coefficients[p], forces[p].x(), forces[p].y(), forces[p].z()));
     });
-    PorousFields& fields = flow.porous_fields_for_writing();
+    in_precision(flow.options().precision,
+                 [&]<class Real>(Real) { spread_drag<Real>(flow.porous_fields_for_writing()); });
+}
+
+/// From blocks to the faces of their cells.
+template <class Real>
+void FineCoupling::spread_drag(PorousFields& fields) const
+{
+    const std::span<const Field, 4> blocks(block_fields_.data(), 4);
     const Vector3i n = grid_.cells;
     const auto half_outside = [&](int d, int f) {
         return (f == 0 && grid_.outlet(d, 0)) || (f == n[d] && grid_.outlet(d, 1)) ? 2.0 : 1.0;
@@ -339,22 +368,22 @@ void FineCoupling::deposit_drag(Flow& flow, std::span<const double> coefficients
             if (grid_.periodic(d)) i = wrap(i, n[d]);
             return i >= 0 && i < n[d] ? shares[std::size_t(i)] : 0.0;
         };
-        const auto mix = [](double* __restrict to, int count, double low, double high, const std::vector<double>& before,
+        const auto mix = [](Real* __restrict to, int count, double low, double high, const std::vector<double>& before,
                             const std::vector<double>& after) {
-            for (int i = 0; i < count; ++i) to[i] = low * before[std::size_t(i)] + high * after[std::size_t(i)];
+            for (int i = 0; i < count; ++i) to[i] = Real(low * before[std::size_t(i)] + high * after[std::size_t(i)]);
         };
         const auto put = [&](std::size_t d, std::size_t f0, double low, double high, const Rows& before,
                              const Rows& after) {
-            mix(fields.drag_rate[d].data() + f0, n.x(), low, high, before[0], after[0]);
-            mix(fields.drag_force[d].data() + f0, n.x(), low, high, before[d + 1], after[d + 1]);
+            mix(fields.drag_rate[d].data<Real>() + f0, n.x(), low, high, before[0], after[0]);
+            mix(fields.drag_force[d].data<Real>() + f0, n.x(), low, high, before[d + 1], after[d + 1]);
         };
-        const auto put_along = [&](double* __restrict to, const std::vector<double>& row) {
+        const auto put_along = [&](Real* __restrict to, const std::vector<double>& row) {
             const double *low = high_share_[0].data(), *high = low_share_[0].data(), *value = row.data();
-            for (int i = 1; i < n.x(); ++i) to[i] = low[i - 1] * value[i - 1] + high[i] * value[i];
+            for (int i = 1; i < n.x(); ++i) to[i] = Real(low[i - 1] * value[i - 1] + high[i] * value[i]);
             for (int i : {0, n.x()}) {
                 const double half_x = half_outside(0, i);
-                to[i] = half_x * share(high_share_[0], i - 1, 0) * value[wrap(i - 1, n.x())] +
-                        half_x * share(low_share_[0], i, 0) * value[wrap(i, n.x())];
+                to[i] = Real(half_x * share(high_share_[0], i - 1, 0) * value[wrap(i - 1, n.x())] +
+                             half_x * share(low_share_[0], i, 0) * value[wrap(i, n.x())]);
             }
         };
         for (int k = int(begin); k < int(end); ++k) {
@@ -372,8 +401,8 @@ void FineCoupling::deposit_drag(Flow& flow, std::span<const double> coefficients
                     put(1, f0, half_y * share(high_share_[1], j - 1, 1), half_y * share(low_share_[1], j, 1), below,
                         here);
                 if (j < n.y() && k < n.z()) {
-                    put_along(fields.drag_rate[0].data() + f0, here[0]);
-                    put_along(fields.drag_force[0].data() + f0, here[1]);
+                    put_along(fields.drag_rate[0].data<Real>() + f0, here[0]);
+                    put_along(fields.drag_force[0].data<Real>() + f0, here[1]);
                 }
                 std::swap(here, below);
             }
@@ -381,16 +410,18 @@ void FineCoupling::deposit_drag(Flow& flow, std::span<const double> coefficients
     });
 }
 
-void FineCoupling::drag_lag(const Flow& flow, std::span<const double> coefficients, std::span<Vector3d> lag) const
+/// Per block the mean of u* - u^n.
+template <class Real>
+void FineCoupling::average_change(const Flow& flow) const
 {
-    const double* u[3] = {flow.velocity(0).data(), flow.velocity(1).data(), flow.velocity(2).data()};
-    const double* us[3] = {flow.provisional(0).data(), flow.provisional(1).data(), flow.provisional(2).data()};
+    const Real *u[3], *us[3];
+    for (int d = 0; d < 3; ++d) u[d] = flow.velocity(d).data<Real>(), us[d] = flow.provisional(d).data<Real>();
     // the transpose of deposit_drag: each cell sees its faces with the shares it gave them
     average_blocks(std::span<Field, 3>(block_fields_.data(), 3), [&](int j, int k, double* const* rows) {
         const auto c0 = std::ptrdiff_t(layout_.index(0, j, k));
         const int n = grid_.cells.x(), position[3] = {0, j, k};
         const double *low_x = low_share_[0].data(), *high_x = high_share_[0].data();
-        const auto change = [&](int d, std::ptrdiff_t f) { return us[d][f] - u[d][f]; };
+        const auto change = [&](int d, std::ptrdiff_t f) { return double(us[d][f]) - double(u[d][f]); };
         for (int i = 0; i + 1 < n; ++i) rows[0][i] = low_x[i] * change(0, c0 + i) + high_x[i] * change(0, c0 + i + 1);
         // u* has no periodic copy at the far side yet
         rows[0][n - 1] =
@@ -403,6 +434,11 @@ void FineCoupling::drag_lag(const Flow& flow, std::span<const double> coefficien
             for (int i = 0; i < n; ++i) rows[d][i] = low * change(d, c0 + i) + high * change(d, c0 + i + up);
         }
     });
+}
+
+void FineCoupling::drag_lag(const Flow& flow, std::span<const double> coefficients, std::span<Vector3d> lag) const
+{
+    in_precision(flow.options().precision, [&]<class Real>(Real) { average_change<Real>(flow); });
     gather(felt_, std::span<const Field, 3>(block_fields_.data(), 3), lag_sums_);
     for (std::size_t i = 0; i < count_; ++i) lag[i] = coefficients[i] * lag_sums_[i];
 }

@@ -136,10 +136,19 @@ private:
     template <std::size_t count>
     void gather(const std::vector<Weights>& chunks, std::span<const Field, count> fields,
                 std::vector<Eigen::Matrix<double, int(count), 1>>& sums) const;
+    template <class Real>
     void find_void_fraction();
-    void deposit_flux(int axis, int k, Field& flux) const;
+    template <class Real>
+    void deposit_flux(int axis, int k, Real* flux) const;
     void find_own_overlap();
+    template <class Real>
     void gather_pressure_gradient(const Flow& flow, std::span<FeltFlow> felt) const;
+    template <class Real>
+    void average_felt(const Flow& flow, std::span<FeltFlow> felt) const;
+    template <class Real>
+    void spread_drag(PorousFields& fields) const;
+    template <class Real>
+    void average_change(const Flow& flow) const;
     double support_radius(double diameter) const;
     template <std::size_t count, class Fill>
     void average_blocks(std::span<Field, count> averages, const Fill& fill) const;
@@ -162,7 +171,7 @@ private:
     std::vector<double> radius_;       // of the felt support [m]
     Field open_cells_, open_blocks_;   // 1 - phi per cell (padded); its sum per block
     Field share_;                      // of the block that a cell makes up: open / sum of open, all alike in a solid block
-    Field void_fraction_;              // of the next step; changes places with the flow's
+    FlowField void_fraction_;          // of the next step; changes places with the flow's
     Field clip_;                       // (1 - eps)/(raw solid fraction)
     std::vector<char> clipped_;        // rows in which it is not 1
     bool any_clipped_ = false;

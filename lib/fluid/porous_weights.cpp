@@ -103,7 +103,6 @@ FineCoupling::FineCoupling(const GridSpec& grid, const KernelOptions& options)
             high_share_[d].push_back(high ? (low ? 0.5 : 1.0) : 0.0);
         }
     }
-    void_fraction_ = layout_.make_field(1.0);
     open_cells_ = layout_.make_field(1.0);
     share_ = layout_.make_field(0.0);
     clip_ = layout_.make_field(1.0);

@@ -304,6 +304,7 @@ void read_fluid(const ConfigTable& root, Case& result)
 {
     if (!root.has("fluid")) return;
     static const Strings disturbances{"removed", "volume-removed", "kept"};
+    static const Strings precisions{"double", "single"};
     const ConfigTable fluid = root.table("fluid");
     FluidSpec spec;
     spec.density = positive(fluid, "density", Dimension::density, spec.density);
@@ -312,6 +313,7 @@ void read_fluid(const ConfigTable& root, Case& result)
     spec.initial_velocity = fluid.vector("initial_velocity", Dimension::velocity, spec.initial_velocity);
     spec.drag = fluid.choice("drag", fluid::drag_law_names(), "gidaspow");
     spec.self_disturbance = fluid.choice("self_disturbance", disturbances, "removed");
+    spec.precision = read_choice<fluid::Precision>(fluid, "precision", precisions, "double");
     const std::vector<double> support = fluid.quantities("kernel_support", Dimension::number, std::vector<double>{2, 4});
     if (support.size() != 2 || !(support[0] >= 1 && support[1] >= support[0] && support[1] <= 12))
         fluid.error("kernel_support", "is no pair of support diameters", "give [for the void fraction, for what a grain feels] in grain diameters, such as [2, 4]");

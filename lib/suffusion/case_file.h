@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "dem/body.h"
+#include "fluid/flow_field.h"
 
 namespace coral::suffusion {
 
@@ -45,6 +46,7 @@ struct FluidSpec {
     Eigen::Vector3d initial_velocity = Eigen::Vector3d::Zero();   ///< [m/s]
     std::string drag = "gidaspow";               ///< a name of fluid::drag_law_names()
     std::string self_disturbance = "removed";    ///< removed | volume-removed | kept: fluid::SelfDisturbance
+    fluid::Precision precision = fluid::Precision::float64;  ///< of the fields of the flow
     std::array<double, 2> kernel_support{2, 4};  ///< diameters of the volume and the felt kernel over that of the grain
 };
 

@@ -40,6 +40,7 @@ fluid::FlowOptions flow_options(const Scene& scene)
     options.kinematic_viscosity = c.fluid->kinematic_viscosity;
     options.body_acceleration = c.fluid->body_acceleration;
     options.scheme = flow_scheme(scene);
+    options.precision = c.fluid->precision;
     options.cfl = c.time.cfl;
     options.max_time_step = c.time.max_step;
     return options;
@@ -256,9 +257,17 @@ std::vector<std::uint8_t> Simulation::save() const
     out.array<std::uint8_t>(scene_->world.save());
     if (!flow_) return out.take();
     const fluid::FlowState state = flow_->save();
+    const fluid::Precision precision = flow_->options().precision;
     out.reserve(2 * out.bytes().size() + 8 * sizeof(double) * state.pressure.size());  // what follows the fields is less than what is before them
-    for (int axis = 0; axis < 3; ++axis) out.array<double>(state.velocity[axis]), out.array<double>(state.previous_rate[axis]);
-    out.array<double>(state.pressure), out.array<double>(state.void_fraction), out.array<double>(state.scalars);
+    const auto field = [&](const fluid::FlowField& from) {
+        fluid::in_precision(precision, [&]<class Real>(Real) { 
+            out.array<Real>(from.empty() ? std::span<const Real>() : std::span<const Real>(from.data<Real>(), from.size()));
+        });
+    };
+    out.integer(static_cast<std::int64_t>(precision));
+    for (int axis = 0; axis < 3; ++axis) field(state.velocity[axis]), field(state.previous_rate[axis]);
+    field(state.pressure), field(state.void_fraction);
+    out.array<double>(state.scalars);
     std::vector<double> poses;
     for (const fluid::RigidMotion& m : grains_->immersed().placed_motions()) {
         for (const Vector3d& v : {m.position, m.velocity, m.angular_velocity}) poses.insert(poses.end(), v.data(), v.data() + 3);
@@ -282,9 +291,9 @@ void Simulation::restore(std::span<const std::uint8_t> state)
     scene_->world.restore(in.array<std::uint8_t>());
     if (!flow_) return;
     fluid::FlowState flow;
-    const auto field = [&](fluid::Field& to) {
-        const std::vector<double> values = in.array<double>();
-        to.assign(values.begin(), values.end());
+    const auto precision = in.integer() == 0 ? fluid::Precision::float64 : fluid::Precision::float32;
+    const auto field = [&](fluid::FlowField& to) {
+        to = fluid::in_precision(precision, [&]<class Real>(Real) { return fluid::FlowField(std::span<const Real>(in.array<Real>())); });
     };
     for (int axis = 0; axis < 3; ++axis) field(flow.velocity[axis]), field(flow.previous_rate[axis]);
     field(flow.pressure), field(flow.void_fraction);

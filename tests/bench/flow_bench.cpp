@@ -38,21 +38,28 @@ void report(benchmark::State& state, const Flow& flow, const FlowTimes& before)
     state.counters["fines_ms"] = ms(now.fines, before.fines);
 }
 
+FlowOptions options(const benchmark::State& state)
+{
+    FlowOptions options;
+    options.precision = state.range(1) == 32 ? Precision::float32 : Precision::float64;
+    return options;
+}
+
 void flow_step(benchmark::State& state)
 {
-    Flow flow(domain(static_cast<int>(state.range(0))), {});
+    Flow flow(domain(static_cast<int>(state.range(0))), options(state));
     for (int i = 0; i < 3; ++i) flow.step(flow.stable_time_step());
     const FlowTimes before = flow.times();
     for (auto _ : state) flow.step(flow.stable_time_step());
     report(state, flow, before);
 }
-BENCHMARK(flow_step)->ArgName("cells_x")->Arg(60)->Arg(120)->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK(flow_step)->ArgNames({"cells_x", "bits"})->ArgsProduct({{60, 120, 240}, {64, 32}})->Unit(benchmark::kMillisecond)->UseRealTime();
 
 /// 48 spheres of 15 mm on a lattice, moving slowly, so that their faces are found anew.
 void flow_step_with_grains(benchmark::State& state)
 {
     const GridSpec grid = domain(static_cast<int>(state.range(0)));
-    Flow flow(grid, {});
+    Flow flow(grid, options(state));
     ImmersedBodies bodies(grid);
     std::vector<RigidMotion> motions;
     for (int i = 0; i < 36; ++i) {
@@ -76,13 +83,13 @@ void flow_step_with_grains(benchmark::State& state)
     for (auto _ : state) step();
     report(state, flow, before);
 }
-BENCHMARK(flow_step_with_grains)->ArgName("cells_x")->Arg(60)->Arg(120)->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK(flow_step_with_grains)->ArgNames({"cells_x", "bits"})->ArgsProduct({{60, 120, 240}, {64, 32}})->Unit(benchmark::kMillisecond)->UseRealTime();
 
 /// 3900 fines of 1.5 to 3 mm spread over the domain, held in place.
 void flow_step_with_fines(benchmark::State& state)
 {
     const GridSpec grid = domain(static_cast<int>(state.range(0)));
-    Flow flow(grid, {});
+    Flow flow(grid, options(state));
     FineCoupling fines(grid);
     std::mt19937_64 random(5);
     std::uniform_real_distribution<double> unit(0, 1);
@@ -115,20 +122,17 @@ void flow_step_with_fines(benchmark::State& state)
     report(state, flow, before);
     state.counters["weights"] = static_cast<double>(fines.stored_weights());
 }
-BENCHMARK(flow_step_with_fines)->ArgName("cells_x")->Arg(60)->Arg(120)->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK(flow_step_with_fines)->ArgNames({"cells_x", "bits"})->ArgsProduct({{60, 120, 240}, {64, 32}})->Unit(benchmark::kMillisecond)->UseRealTime();
 
 void poisson_solve(benchmark::State& state)
 {
     const GridSpec grid = domain(static_cast<int>(state.range(0)));
-    const Poisson poisson(grid);
-    Field work = poisson.make_work(), scratch;
+    const Poisson poisson(grid, options(state).precision);
+    FlowField work = poisson.make_work(), scratch;
     std::mt19937_64 random(7);
     std::uniform_real_distribution<double> value(-1, 1);
-    const Field source = [&] {
-        Field f(work.size());
-        for (double& x : f) x = value(random);
-        return f;
-    }();
+    FlowField source = work;
+    for (std::size_t at = 0; at < source.size(); ++at) source.set(at, value(random));
     for (auto _ : state) {
         state.PauseTiming();
         work = source;
@@ -137,6 +141,6 @@ void poisson_solve(benchmark::State& state)
     }
     state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(grid.cell_count()));
 }
-BENCHMARK(poisson_solve)->ArgName("cells_x")->Arg(60)->Arg(120)->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK(poisson_solve)->ArgNames({"cells_x", "bits"})->ArgsProduct({{60, 120, 240}, {64, 32}})->Unit(benchmark::kMillisecond)->UseRealTime();
 
 }  // namespace

@@ -332,7 +332,10 @@ TEST(ImmersedBodies, placed_again_one_by_one_have_the_same_bits_as_placed_at_onc
             bits.insert(bits.end(), action.forced_inertia.data(), action.forced_inertia.data() + 9);
         }
         bodies.apply(flow, motions);
-        for (int axis = 0; axis < 3; ++axis) bits.insert(bits.end(), flow.provisional(axis).begin(), flow.provisional(axis).end());
+        for (int axis = 0; axis < 3; ++axis) {
+            const FlowField& u = flow.provisional(axis);
+            bits.insert(bits.end(), u.data<double>(), u.data<double>() + u.size());
+        }
         return bits;
     };
     ImmersedBodies moved = fresh();
@@ -398,7 +401,7 @@ TEST(ImmersedBodies, give_the_same_bits_with_one_and_two_threads_and_after_a_res
             bodies.place(motions);
         }
     };
-    std::vector<Field> results;
+    std::vector<FlowField> results;
     for (int threads : {1, 2}) {
         coral::set_thread_count(threads);
         auto [flow, bodies] = scene();
@@ -417,7 +420,7 @@ TEST(ImmersedBodies, give_the_same_bits_with_one_and_two_threads_and_after_a_res
         results.push_back(flow.velocity(2));
         results.push_back(flow_again.velocity(2));
     }
-    for (const Field& result : results) EXPECT_EQ(result, results[0]);
+    for (const FlowField& result : results) EXPECT_EQ(result, results[0]);
 }
 
 TEST(ImmersedBodies, let_the_sphere_of_ten_cate_fall_as_measured)

@@ -167,10 +167,11 @@ TEST(CaseFile, wants_periodic_faces_in_pairs_and_whole_cells)
 TEST(CaseFile, reads_how_fines_feel_the_flow)
 {
     const Scratch scratch;
-    scratch.write("case.toml", "[domain]\nsize = [1, 1, 1]\ncell = 0.1\n[fluid]\ndrag = \"hoelzer-sommerfeld\"\nself_disturbance = \"volume-removed\"\nkernel_support = [3, 6]\n[time]\nduration = 1\n");
+    scratch.write("case.toml", "[domain]\nsize = [1, 1, 1]\ncell = 0.1\n[fluid]\ndrag = \"hoelzer-sommerfeld\"\nself_disturbance = \"volume-removed\"\nprecision = \"single\"\nkernel_support = [3, 6]\n[time]\nduration = 1\n");
     const Case c = read_case(scratch.path());
     EXPECT_EQ(c.fluid->drag, "hoelzer-sommerfeld");
     EXPECT_EQ(c.fluid->self_disturbance, "volume-removed");
+    EXPECT_EQ(c.fluid->precision, coral::fluid::Precision::float32);
     EXPECT_EQ(c.fluid->kernel_support[1], 6.0);
     scratch.write("case.toml", "[domain]\nsize = [1, 1, 1]\ncell = 0.1\n[fluid]\ndrag = \"di-felise\"\nself_disturbance = \"gone\"\nkernel_support = [4, 2]\n[time]\nduration = 1\n");
     try {

@@ -166,7 +166,7 @@ WalledBed walled_bed(double reynolds, int cells_per_diameter)
     }
     WalledBed bed{drop.value() / (box.z() * ergun_pressure_gradient(bed_void_fraction, U, d, water_density, nu)), 0, 0, 0, 0};
     double core = 0, wall = 0;
-    const Field& eps = s.flow.porous_fields().void_fraction;
+    const FlowField& eps = s.flow.porous_fields().void_fraction;
     for (int k = 0; k < grid.cells.z(); ++k)
         for (int j = 0; j < grid.cells.y(); ++j)
             for (int i = 0; i < grid.cells.x(); ++i) {

@@ -9,7 +9,7 @@
 namespace coral::validate {
 
 /// Trilinear value of a padded field at a point given in cells from the field's own first place, ghosts included.
-inline double padded_value(const fluid::Layout& layout, const fluid::Field& field, Eigen::Vector3d x)
+inline double padded_value(const fluid::Layout& layout, const fluid::FlowField& field, Eigen::Vector3d x)
 {
     Eigen::Vector3i low;
     for (int d = 0; d < 3; ++d) {
@@ -41,7 +41,7 @@ inline void start_from(const fluid::Flow& coarse, fluid::Flow& flow)
         for (int j = -1; j <= flow.grid().cells.y(); ++j)
             for (int i = -1; i <= flow.grid().cells.x(); ++i) {
                 const Eigen::Vector3d place = ratio * Eigen::Vector3d(i + 0.5, j + 0.5, k + 0.5) - Eigen::Vector3d::Constant(0.5);
-                state.pressure[flow.layout().index(i, j, k)] = padded_value(coarse.layout(), coarse.pressure(), place);
+                state.pressure.set(flow.layout().index(i, j, k), padded_value(coarse.layout(), coarse.pressure(), place));
             }
     flow.restore(state);
 }

@@ -5,13 +5,11 @@
 /// 28:27, 1980].
 #include <cstddef>
 #include <memory>
-#include <mutex>
 
 namespace coral::fluid::detail {
 
-/// FFTW's planner keeps global state: hold this while a plan is made or destroyed.
-std::mutex& planner_mutex();
-
+/// \tparam Real  double or float
+template <class Real>
 class CosinePlanes {
 public:
     /// \param na, nb  points along the fast and the slow direction of a plane
@@ -20,9 +18,9 @@ public:
 
     /// In place on two planes of nb rows of na values, like FFTW's unnormalised REDFT10 in both directions. `second`
     /// may be null.
-    void forward(double* first, double* second) const;
+    void forward(Real* first, Real* second) const;
     /// Like REDFT01 in both directions; forward then backward multiplies by 4 na nb.
-    void backward(double* first, double* second) const;
+    void backward(Real* first, Real* second) const;
 
 private:
     struct Impl;

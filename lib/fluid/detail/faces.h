@@ -41,8 +41,8 @@ inline double weighted_row(const GridSpec& grid, int axis, const FaceRange& rang
 {
     double total = sum(range.row_length(), value);
     if (axis == 0 && range.row_length() > 0) {
-        if (grid.outlet(0, 0)) total -= 0.5 * value(0);
-        if (grid.outlet(0, 1)) total -= 0.5 * value(range.row_length() - 1);
+        if (grid.outlet(0, 0)) total -= 0.5 * double(value(0));
+        if (grid.outlet(0, 1)) total -= 0.5 * double(value(range.row_length() - 1));
     }
     return row_weight(grid, axis, j, k) * total;
 }

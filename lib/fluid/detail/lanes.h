@@ -6,24 +6,25 @@
 
 namespace coral::fluid::detail {
 
-/// sum over i in [0, n) of value(i).
+/// sum over i in [0, n) of value(i), in double whatever the values are.
 template <class Value>
 inline double lane_sum(std::ptrdiff_t n, const Value& value)
 {
     double sum = 0.0;
 #pragma omp simd reduction(+ : sum)
-    for (std::ptrdiff_t i = 0; i < n; ++i) sum += value(i);
+    for (std::ptrdiff_t i = 0; i < n; ++i) sum += double(value(i));
     return sum;
 }
 
 /// largest value(i), at least 0.
 template <class Value>
-inline double lane_max(std::ptrdiff_t n, const Value& value)
+inline auto lane_max(std::ptrdiff_t n, const Value& value)
 {
-    double largest = 0.0;
+    using Real = decltype(value(n));
+    Real largest = 0;
 #pragma omp simd reduction(max : largest)
     for (std::ptrdiff_t i = 0; i < n; ++i) {
-        const double v = value(i);
+        const Real v = value(i);
         largest = v > largest ? v : largest;
     }
     return largest;
