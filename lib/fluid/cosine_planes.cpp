@@ -96,23 +96,23 @@ struct CosinePlanes<Real>::Impl {
 
     Impl(std::size_t na_, std::size_t nb_) : na(na_), nb(nb_), a(na_), b(nb_)
     {
-        Buffer sample(na * nb);
+        Buffers sample = buffers();
         const std::lock_guard lock(planner_mutex());
-        auto* data = reinterpret_cast<typename Fft::Complex*>(sample.data());
-        forth.plan = Fft::plan_dft_2d(int(nb), int(na), data, data, FFTW_FORWARD, FFTW_ESTIMATE);
-        back.plan = Fft::plan_dft_2d(int(nb), int(na), data, data, FFTW_BACKWARD, FFTW_ESTIMATE);
+        forth.plan = Fft::plan_dft_2d(int(nb), int(na), raw(*sample.in), raw(*sample.out), FFTW_FORWARD, FFTW_ESTIMATE);
+        back.plan = Fft::plan_dft_2d(int(nb), int(na), raw(*sample.in), raw(*sample.out), FFTW_BACKWARD, FFTW_ESTIMATE);
     }
-    Buffer& buffer() const
+    /// From one array to another: in place FFTW would copy to and fro.
+    struct Buffers {
+        Buffer *in, *out;
+    };
+    Buffers buffers() const
     {
-        thread_local Buffer values;
-        values.resize(na * nb);
-        return values;
+        thread_local Buffer in, out;
+        in.resize(na * nb), out.resize(na * nb);
+        return {&in, &out};
     }
-    static void transform(const PlanOf<Real>& plan, Buffer& buffer)
-    {
-        auto* data = reinterpret_cast<typename Fft::Complex*>(buffer.data());
-        Fft::execute_dft(plan.plan, data, data);
-    }
+    static typename Fft::Complex* raw(Buffer& buffer) { return reinterpret_cast<typename Fft::Complex*>(buffer.data()); }
+    static void transform(const PlanOf<Real>& plan, const Buffers& of) { Fft::execute_dft(plan.plan, raw(*of.in), raw(*of.out)); }
 };
 
 template <class Real>
@@ -125,13 +125,14 @@ void CosinePlanes<Real>::forward(Real* first, Real* second) const
 {
     using Number = Complex<Real>;
     const std::size_t na = impl_->na, nb = impl_->nb;
-    auto& buffer = impl_->buffer();
+    const auto buffers = impl_->buffers();
     for (std::size_t j = 0; j < nb; ++j) {
-        Number* row = buffer.data() + impl_->b.place[j] * na;
+        Number* row = buffers.in->data() + impl_->b.place[j] * na;
         const Real *x = first + j * na, *y = second ? second + j * na : nullptr;
         for (std::size_t i = 0; i < na; ++i) row[impl_->a.place[i]] = {x[i], y ? y[i] : Real(0)};
     }
-    Impl::transform(impl_->forth, buffer);
+    Impl::transform(impl_->forth, buffers);
+    auto& buffer = *buffers.out;
     for (std::size_t k = 1; k <= nb / 2; ++k) {
         const Number w = impl_->b.twiddle[k];
         Number *low = buffer.data() + k * na, *high = buffer.data() + (nb - k) * na;
@@ -163,7 +164,8 @@ void CosinePlanes<Real>::backward(Real* first, Real* second) const
 {
     using Number = Complex<Real>;
     const std::size_t na = impl_->na, nb = impl_->nb;
-    auto& buffer = impl_->buffer();
+    const auto buffers = impl_->buffers();
+    auto& buffer = *buffers.in;
     for (std::size_t j = 0; j < nb; ++j) {
         Number* row = buffer.data() + j * na;
         const Real *x = first + j * na, *y = second ? second + j * na : nullptr;
@@ -185,9 +187,9 @@ void CosinePlanes<Real>::backward(Real* first, Real* second) const
             high[i] = q;
         }
     }
-    Impl::transform(impl_->back, buffer);
+    Impl::transform(impl_->back, buffers);
     for (std::size_t j = 0; j < nb; ++j) {
-        const Number* row = buffer.data() + impl_->b.place[j] * na;
+        const Number* row = buffers.out->data() + impl_->b.place[j] * na;
         Real *x = first + j * na, *y = second ? second + j * na : nullptr;
         for (std::size_t i = 0; i < na; ++i) {
             const Number value = row[impl_->a.place[i]];
