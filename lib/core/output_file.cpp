@@ -19,8 +19,8 @@ OutputFile::OutputFile(fs::path target) : target_(std::move(target))
     // Renaming would replace a link in place of the file it names, and a device altogether.
     if (fs::is_symlink(target_) && fs::exists(target_)) target_ = fs::canonical(target_);
     const fs::path folder = target_.has_parent_path() ? target_.parent_path() : fs::path(".");
-    if (!fs::is_directory(folder)) throw Error(target_.string(), "the folder " + folder.string() + " does not exist", "make it first");
-    if (fs::is_directory(target_)) throw Error(target_.string(), "is a folder", "give the name of a file");
+    if (!fs::is_directory(folder)) throw UsageError(target_.string(), "the folder " + folder.string() + " does not exist", "make it first");
+    if (fs::is_directory(target_)) throw UsageError(target_.string(), "is a folder", "give the name of a file");
     if (fs::exists(target_) && !fs::is_regular_file(target_)) throw UsageError(target_.string(), "is no ordinary file", "give the name of a file");
     // The extension stays last: readers and writers of some formats go by it.
     temporary_ = folder / ("." + target_.stem().string() + ".part" + std::to_string(::getpid()) + target_.extension().string());

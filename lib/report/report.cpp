@@ -59,7 +59,7 @@ public:
     explicit PartFolder(const fs::path& target)
     {
         const fs::path parent = target.has_parent_path() ? target.parent_path() : fs::path(".");
-        if (!fs::is_directory(parent)) throw Error(target.string(), "the folder " + parent.string() + " does not exist", "make it first");
+        if (!fs::is_directory(parent)) throw UsageError(target.string(), "the folder " + parent.string() + " does not exist", "make it first");
         path_ = parent / ("." + target.filename().string() + ".part" + std::to_string(::getpid()));
         std::error_code failure;
         fs::create_directories(path_ / "figures", failure);
