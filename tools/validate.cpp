@@ -9,6 +9,7 @@
 #include <numbers>
 
 #include "core/error.h"
+#include "core/output_file.h"
 #include "core/table.h"
 #include "fluid/drag.h"
 #include "suffusion/case_file.h"
@@ -21,6 +22,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using coral::validate::Check;
+using coral::validate::balance_tolerance;
 using coral::validate::StudyOptions;
 using coral::suffusion::Case;
 using coral::suffusion::Column;
@@ -30,6 +32,7 @@ struct Options {
     std::string scenes, output, grains;
     std::vector<std::string> only, skip;
     bool heavy = false;
+    std::string precision = "double";
 };
 
 const std::vector<double>& column(const std::vector<Column>& columns, const std::string& name)
@@ -48,8 +51,8 @@ double greatest(const std::vector<double>& values)
 
 std::vector<Check> balances(const Results& r)
 {
-    return {{"mass balance", "1", 0, greatest(column(r.series, "mass_balance_error")), 1e-10, false},
-            {"momentum balance", "1", 0, greatest(column(r.series, "momentum_balance_error")), 1e-6, false}};
+    return {{"mass balance", "1", 0, greatest(column(r.series, "mass_balance_error")), balance_tolerance(1e-10), false},
+            {"momentum balance", "1", 0, greatest(column(r.series, "momentum_balance_error")), balance_tolerance(1e-6), false}};
 }
 
 std::vector<Check> free_fall(const Case& c, const Results& r)
@@ -162,6 +165,7 @@ void declare(coral::cli::Options& options, Options& o)
     options.add("--only", o.only, "Scenes and studies to run, heavy ones too");
     options.add("--skip", o.skip, "Scenes and studies to leave out");
     options.flag("--heavy", o.heavy, "Also what takes minutes: fine resolutions, the large tank");
+    options.add("--precision", o.precision, "Of the flow's fields: double or single").one_of({"double", "single"});
     options.add("--grains", o.grains, "Level sets (csct2ls) for the settling grain; left out without");
 }
 
@@ -169,7 +173,10 @@ Results run_scene(const Options& o, const std::string& name, const coral::cli::C
 {
     const fs::path from = fs::path(o.scenes) / name, to = fs::path(o.output) / name;
     fs::create_directories(to);
-    fs::copy_file(from / "case.toml", to / "case.toml", fs::copy_options::overwrite_existing);
+    std::string text = coral::read_text_file(from / "case.toml");
+    const std::string section = "[fluid]\n";
+    if (const std::size_t at = text.find(section); at != std::string::npos) text.insert(at + section.size(), "precision = \"" + o.precision + "\"\n");
+    coral::write_text_file(to / "case.toml", text);
     coral::suffusion::RunOptions options;
     options.record = context.record;
     coral::suffusion::run_case(to, options);
@@ -237,6 +244,7 @@ void run(const Options& o, const coral::cli::Context& context)
         return o.only.empty() ? o.heavy || !heavy : std::ranges::find(o.only, name) != o.only.end();
     };
     fs::create_directories(o.output);
+    coral::validate::precision = o.precision == "single" ? coral::fluid::Precision::float32 : coral::fluid::Precision::float64;
     Report report(fs::path(o.output) / "validation.csv", !context.json && !context.quiet);
     for (const Scene& scene : scenes) {
         if (!wanted(scene.name, scene.heavy)) continue;

@@ -38,7 +38,7 @@ fluid::GridSpec unit_cell(int cells)
 
 fluid::FlowOptions creeping()
 {
-    fluid::FlowOptions options;
+    fluid::FlowOptions options = flow_options();
     options.density = 1;
     options.kinematic_viscosity = 1;
     options.convection = fluid::Convection::none;

@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "fluid/flow.h"
+
 namespace coral::validate {
 
 /// Tolerance of rows that only show how an error falls.
@@ -31,6 +33,19 @@ struct StudyOptions {
     std::filesystem::path grains;  ///< grains.vdb for the settling grain; may be empty
     bool heavy = false;            ///< also the resolutions that take minutes
 };
+
+/// Of the flow's fields in all scenes and studies; the command line sets it before the first.
+inline fluid::Precision precision = fluid::Precision::float64;
+
+inline fluid::FlowOptions flow_options()
+{
+    fluid::FlowOptions options;
+    options.precision = precision;
+    return options;
+}
+
+/// What a balance may be off by, where fields in double allow `in_double`.
+inline double balance_tolerance(double in_double) { return precision == fluid::Precision::float32 ? 1e-4 : in_double; }
 
 /// Processor time of this process so far [s].
 inline double processor_seconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }

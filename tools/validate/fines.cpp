@@ -85,7 +85,7 @@ double falling_speed(double d, double cells_per_diameter, SelfDisturbance self)
     KernelOptions kernel;
     kernel.self_disturbance = self;
     const Vector3d start = grid.size().cwiseProduct(Vector3d(0.5, 0.5, 1)) + Vector3d(0.21 * h, -0.13 * h, -6 * length);
-    Suspension s(grid, {}, {start}, d, kernel);
+    Suspension s(grid, flow_options(), {start}, d, kernel);
     s.velocities[0].z() = -terminal_speed(d, density);
     const double mass = density * s.volume(), weight = (density - water_density) * s.volume() * 9.81;
     TimeMean speed;
@@ -119,7 +119,7 @@ double periodic_bed(double reynolds, int cells_per_diameter, unsigned seed)
     grid.cells.setConstant(4 * static_cast<int>(std::lround(0.25 * L / d * cells_per_diameter)));
     grid.cell = L / grid.cells.x();
     for (Boundary& side : grid.boundary) side.kind = BoundaryKind::periodic;
-    FlowOptions options;
+    FlowOptions options = flow_options();
     options.kinematic_viscosity = nu;
     options.body_acceleration = {0, 0, gradient / water_density};
     Suspension s(grid, options, random_spheres(count, d, Vector3d::Constant(L), true, seed), d);
@@ -152,7 +152,7 @@ WalledBed walled_bed(double reynolds, int cells_per_diameter)
     grid.origin.z() = -free;
     grid.boundary[z_minus] = {BoundaryKind::inlet, {0, 0, U}, 0};
     grid.boundary[z_plus].kind = BoundaryKind::outlet;
-    FlowOptions options;
+    FlowOptions options = flow_options();
     options.kinematic_viscosity = nu;
     Suspension s(grid, options, random_spheres(3380, d, box, false, 1), d);
     s.flow.set_velocity([&](const Vector3d&, int axis) { return axis == 2 ? U : 0.0; });
@@ -193,7 +193,7 @@ double held_sphere(double cells_per_diameter, double width, bool resolved)
     grid.boundary[z_minus] = {BoundaryKind::inlet, {0, 0, U}, 0};
     grid.boundary[z_plus].kind = BoundaryKind::outlet;
     const Vector3d place = grid.size().cwiseProduct(Vector3d(0.5, 0.5, 0)) + Vector3d(0.21 * h, -0.13 * h, 4.1 * d);
-    Suspension s(grid, {}, resolved ? std::vector<Vector3d>{} : std::vector<Vector3d>{place}, d);
+    Suspension s(grid, flow_options(), resolved ? std::vector<Vector3d>{} : std::vector<Vector3d>{place}, d);
     ImmersedBodies bodies(grid);
     std::vector<RigidMotion> motions(resolved ? 1 : 0);
     if (resolved) motions[0].position = place, bodies.add(sphere_shape(d), motions[0]), bodies.place(motions);

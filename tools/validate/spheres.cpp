@@ -42,7 +42,7 @@ struct Stream {
     }
     static fluid::FlowOptions liquid(double reynolds)
     {
-        fluid::FlowOptions options;
+        fluid::FlowOptions options = flow_options();
         options.density = 1;
         options.kinematic_viscosity = 1 / reynolds;
         return options;
@@ -113,7 +113,7 @@ std::vector<Check> rotating_sphere(const StudyOptions& options)
         grid.cells.setConstant(static_cast<int>(std::lround(edge * cells)));
         grid.cell = edge / grid.cells.x();
         for (fluid::Boundary& side : grid.boundary) side.kind = fluid::BoundaryKind::periodic;
-        fluid::FlowOptions liquid;
+        fluid::FlowOptions liquid = flow_options();
         liquid.density = liquid.kinematic_viscosity = 1;
         liquid.convection = fluid::Convection::none;
         fluid::Flow flow(grid, liquid);
