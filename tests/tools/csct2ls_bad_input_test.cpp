@@ -246,7 +246,7 @@ TEST_F(BadInput, outputs_that_cannot_be_written)
     write("s.nrrd", nrrd(voxels_));
     expect("s.nrrd --voxel-size 30um", 2, {"absent/out.vdb: the folder absent does not exist"}, " -o absent/out.vdb");
     expect("s.nrrd --voxel-size 30um", 2, {"absent/voids.csv: the folder absent does not exist"}, " -o out.vdb --voids absent/voids.csv");
-    expect("s.nrrd --voxel-size 30um", 2, {"--mesh absent/meshes: the folder cannot be written to"}, " -o out.vdb --mesh absent/meshes");
+    expect("s.nrrd --voxel-size 30um", 2, {"--mesh absent/meshes: its folder does not exist"}, " -o out.vdb --mesh absent/meshes");
     expect("s.nrrd --voxel-size 30um", 2, {"--mesh s.nrrd: is not a folder"}, " -o out.vdb --mesh s.nrrd");
     fs::create_directory(folder_.path() / "taken.vdb");
     expect("s.nrrd --voxel-size 30um", 2, {"taken.vdb: is a folder"}, " -o taken.vdb");

@@ -21,6 +21,8 @@ MeshFolder::MeshFolder(fs::path folder, std::string format) : folder_(std::move(
     if (!failure) return;
     std::error_code ignored;
     if (made_) fs::remove(folder_, ignored);
+    if (failure == std::errc::no_such_file_or_directory)
+        throw UsageError("--mesh " + folder_.string(), "its folder does not exist", "make the folder first");
     throw Error("--mesh " + folder_.string(), "the folder cannot be written to: " + failure.message(), "choose another folder");
 }
 
