@@ -95,8 +95,6 @@ Flow::Flow(const GridSpec& grid, const FlowOptions& options) : grid_(grid), layo
     }
     pressure_ = make_field();
     work_ = poisson_->make_work();
-    const std::size_t blocks = (std::size_t(grid.cells.z()) + 1 + planes_per_block - 1) / planes_per_block;
-    scratch_ = FlowField(blocks * scratch_block(), options.precision);
     restart_history();
 }
 

@@ -117,6 +117,7 @@ struct FlowState {
 class Poisson;
 namespace detail {
 struct FaceRange;
+struct Stage;
 }
 
 class Flow {
@@ -206,15 +207,12 @@ public:
     void restore(const FlowState& state);
 
 private:
-    /// Two planes and five rows: see sweep_component.
-    std::size_t scratch_block() const { return std::size_t(2 * layout_.stride[2] + 5 * layout_.stride[1]); }
-    struct Stage;
     FlowField make_field(double value = 0.0) const { return FlowField(layout_.total, options_.precision, value); }
     template <class Real, bool porous, Convection convection>
-    void sweep_component(int axis, const Stage& stage);
+    void sweep_components(const detail::Stage& stage);
     template <Convection convection>
-    void sweep_all(const Stage& stage);
-    void sweep(const Stage& stage);
+    void sweep_all(const detail::Stage& stage);
+    void sweep(const detail::Stage& stage);
     void start_next_stage();
     void run_stages(double dt);
     template <class Real, bool porous, Convection convection>
@@ -260,7 +258,6 @@ private:
     FlowField pressure_;
     FlowField work_;     // right-hand side and solution of the Poisson equation
     FlowField turned_;   // the same with another axis slowest, where the solver needs it
-    FlowField scratch_;  // rolling fluxes of the predictor, one part per block of planes
     PorousFields porous_;
     bool has_fines_ = false;
     MomentumTally momentum_;

@@ -4,6 +4,7 @@
 
 #include "core/parallel.h"
 #include "fluid/detail/advection.h"
+#include "fluid/detail/component_sweep.h"
 #include "fluid/detail/faces.h"
 #include "fluid/detail/lanes.h"
 #include "fluid/flow.h"
@@ -15,6 +16,7 @@ using detail::FaceRange;
 using detail::low_flux;
 using detail::low_volume_flux;
 using detail::planes_per_block;
+using detail::Stage;
 
 namespace {
 
@@ -41,110 +43,38 @@ static ComponentView<Real> view_of(int axis, const Layout& layout, const std::ar
     return view;
 }
 
-/// One evaluation of the explicit terms: u* = u + (now R - before R_old)/eps - push (grad p - f) + held H, times in s.
-struct Flow::Stage {
-    double now = 0.0, before = 0.0;  ///< of the rate just found and of the one before it
-    double push = 0.0;               ///< of the pressure gradient and the body acceleration
-    double held = 0.0;               ///< of what drag and forcing did in the last step
-};
-
-/// One component: rate = -div(flux) (+ u div q with fines), then as Stage says. Each flux is computed once: rows keep
-/// those of the low y side, planes those of the low z side.
+/// Explicit terms of all components, in blocks of planes.
 template <class Real, bool porous, Convection convection>
-void Flow::sweep_component(int axis, const Stage& stage)
+void Flow::sweep_components(const Stage& stage)
 {
+    using Sweep = detail::ComponentSweep<Real, porous, convection>;
     const double h = grid_.cell;
-    const ComponentView<Real> view = view_of<Real, porous>(axis, layout_, velocity_, volume_flux_, porous_.void_fraction,
-                                               options_.kinematic_viscosity / h);
-    const FaceRange range(grid_, axis);
-    const std::ptrdiff_t sy = layout_.stride[1], sz = layout_.stride[2], own = layout_.stride[axis];
-    const std::ptrdiff_t n = range.row_length();
-    const Real acceleration = Real(options_.body_acceleration[axis]);
-    const Real inverse_h = Real(1.0 / h);
-    const Real* const u = view.u;
-    const Real* const p = pressure_.data<Real>();
-    const Real* const eps = porous ? porous_.void_fraction.data<Real>() : nullptr;
-    const Real now = Real(stage.now), before = Real(stage.before), push = Real(stage.push), held = Real(stage.held);
-    const Real* const hold = stage.held != 0.0 ? held_[axis].data<Real>() : nullptr;
-    Real* const out = provisional_[axis].data<Real>();
-    Real* const rate = rate_[axis].data<Real>();
-    constexpr bool advective = porous && convection != Convection::none;
-    const std::size_t block_size = scratch_block();
-    advective_sum_[axis] = parallel_sum(range.planes(), planes_per_block, 0.0, [&](std::size_t begin, std::size_t end) {
-        Real* __restrict gz =
-            scratch_.data<Real>() + begin / planes_per_block * block_size;  // momentum fluxes through low sides
-        Real* __restrict qz = gz + sz;                              // volume fluxes, only with fines
-        Real* __restrict gy = qz + sz;
-        Real* __restrict qy = gy + sy;
-        Real* __restrict gx = qy + sy;
-        Real* __restrict qx = gx + sy;
-        Real* __restrict transported = qx + sy;
-        double sum = 0.0;
-        const int k_begin = range.low.z() + int(begin), k_end = range.low.z() + int(end);
-        const auto start_row = [&](int direction, std::ptrdiff_t f0, std::ptrdiff_t count, Real* __restrict g,
-                                   Real* __restrict q) {
-#pragma GCC ivdep
-            for (std::ptrdiff_t i = 0; i < count; ++i) g[i] = low_flux<porous, convection>(view, direction, f0 + i);
-            if constexpr (advective) {
-#pragma GCC ivdep
-                for (std::ptrdiff_t i = 0; i < count; ++i) q[i] = low_volume_flux(view, direction, f0 + i);
-            }
-        };
-        for (int j = range.low.y(); j < range.high.y(); ++j)
-            start_row(2, std::ptrdiff_t(layout_.index(range.low.x(), j, k_begin)), n, gz + j * sy, qz + j * sy);
-        for (int k = k_begin; k < k_end; ++k) {
-            start_row(1, std::ptrdiff_t(layout_.index(range.low.x(), range.low.y(), k)), n, gy, qy);
-            for (int j = range.low.y(); j < range.high.y(); ++j) {
-                const auto f0 = std::ptrdiff_t(layout_.index(range.low.x(), j, k));
-                start_row(0, f0, n + 1, gx, qx);
-                Real* __restrict g = gz + j * sy;
-                Real* __restrict q = qz + j * sy;
-#pragma GCC ivdep
-                for (std::ptrdiff_t i = 0; i < n; ++i) {
-                    const std::ptrdiff_t f = f0 + i;
-                    const Real high_y = low_flux<porous, convection>(view, 1, f + sy);
-                    const Real high_z = low_flux<porous, convection>(view, 2, f + sz);
-                    Real r = ((gx[i] - gx[i + 1]) + (gy[i] - high_y) + (g[i] - high_z)) * inverse_h;
-                    gy[i] = high_y;
-                    g[i] = high_z;
-                    if constexpr (advective) {
-                        const Real q_y = low_volume_flux(view, 1, f + sy), q_z = low_volume_flux(view, 2, f + sz);
-                        transported[i] = u[f] * ((qx[i + 1] - qx[i]) + (q_y - qy[i]) + (q_z - q[i]));
-                        qy[i] = q_y;
-                        q[i] = q_z;
-                        r += transported[i] * inverse_h;
-                    }
-                    const Real ab = now * r - before * rate[f];
-                    rate[f] = r;
-                    const Real force = porous ? ab / (Real(0.5) * (eps[f] + eps[f - own])) : ab;
-                    out[f] = u[f] + force - push * ((p[f] - p[f - own]) * inverse_h - acceleration);
-                }
-                if (hold) {
-#pragma GCC ivdep
-                    for (std::ptrdiff_t f = f0; f < f0 + n; ++f) out[f] += held * hold[f];
-                }
-                if constexpr (advective)
-                    sum += detail::weighted_row(
-                        grid_, axis, range, j, k,
-                        [](std::ptrdiff_t m, const auto& v) { return detail::lane_sum(m, v); },
-                        [&](std::ptrdiff_t i) { return transported[i]; });
-            }
-        }
-        return sum;
+    const auto sweep_of = [&](int axis, Real* memory) {
+        const ComponentView<Real> view = view_of<Real, porous>(axis, layout_, velocity_, volume_flux_, porous_.void_fraction,
+                                                               options_.kinematic_viscosity / h);
+        return Sweep(grid_, layout_, view,
+                     {pressure_.data<Real>(), stage.held != 0.0 ? held_[axis].data<Real>() : nullptr, rate_[axis].data<Real>(),
+                      provisional_[axis].data<Real>(), options_.body_acceleration[axis]},
+                     stage, memory);
+    };
+    const std::size_t each = Sweep::memory(layout_);
+    const Eigen::Vector3d zero = Eigen::Vector3d::Zero();
+    advective_sum_ = parallel_sum(std::size_t(grid_.cells.z()) + 1, planes_per_block, zero, [&](std::size_t begin, std::size_t end) {
+        thread_local std::vector<Real, CacheAligned<Real>> memory;
+        memory.resize(3 * each);
+        Sweep sweeps[3] = {sweep_of(0, memory.data()), sweep_of(1, memory.data() + each), sweep_of(2, memory.data() + 2 * each)};
+        for (int k = int(begin); k < int(end); ++k)
+            for (Sweep& sweep : sweeps) sweep.plane(k);
+        return Eigen::Vector3d(sweeps[0].transported(), sweeps[1].transported(), sweeps[2].transported());
     });
-    advective_sum_[axis] *= options_.density * h * h;
+    advective_sum_ *= options_.density * h * h;
 }
 
 template <Convection convection>
 void Flow::sweep_all(const Stage& stage)
 {
     in_precision(options_.precision, [&]<class Real>(Real) {
-        for (int axis = 0; axis < 3; ++axis) {
-            if (has_fines_)
-                sweep_component<Real, true, convection>(axis, stage);
-            else
-                sweep_component<Real, false, convection>(axis, stage);
-        }
+        has_fines_ ? sweep_components<Real, true, convection>(stage) : sweep_components<Real, false, convection>(stage);
     });
 }
 
