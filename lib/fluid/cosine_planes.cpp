@@ -53,15 +53,17 @@ inline Complex<Real> times_i(Complex<Real> a)
 template <class Real>
 struct Direction {
     std::vector<std::size_t> place;
-    std::vector<Complex<Real>> twiddle;  ///< exp(-i pi k / 2n)
+    std::vector<Real> twiddle_re, twiddle_im;  ///< exp(-i pi k / 2n)
     explicit Direction(std::size_t n)
     {
         for (std::size_t s = 0; s < n; ++s) {
             place.push_back(s % 2 == 0 ? s / 2 : n - 1 - s / 2);
             const double angle = std::numbers::pi * double(s) / (2.0 * double(n));
-            twiddle.push_back({Real(std::cos(angle)), Real(-std::sin(angle))});
+            twiddle_re.push_back(Real(std::cos(angle)));
+            twiddle_im.push_back(Real(-std::sin(angle)));
         }
     }
+    Complex<Real> twiddle(std::size_t k) const { return {twiddle_re[k], twiddle_im[k]}; }
 };
 
 /// C(k) = w V(k) + w* V(n-k), C(n-k) = i (w V(k) - w* V(n-k)): holds for two real sequences packed as one, because it
@@ -83,6 +85,40 @@ inline void from_cosine(Complex<Real> w, Complex<Real>& low, Complex<Real>& high
     low = conj(w) * (low - turned);
 }
 
+/// Real and imaginary parts of a row in arrays of their own, the first once more behind the last.
+template <class Real>
+void part(const Complex<Real>* __restrict row, std::size_t n, Real* __restrict re, Real* __restrict im)
+{
+    for (std::size_t k = 0; k < n; ++k) re[k] = row[k].re, im[k] = row[k].im;
+    re[n] = re[0], im[n] = im[0];
+}
+
+/// to_cosine along a parted row: x + i y = scale (w V(k) + w* V(n-k)), the same formula for all k.
+template <class Real>
+void row_to_cosine(const Direction<Real>& d, std::size_t n, Real scale, const Real* __restrict re, const Real* __restrict im,
+                   Real* __restrict x, Real* __restrict y)
+{
+    const Real *wr = d.twiddle_re.data(), *wi = d.twiddle_im.data();
+    for (std::size_t k = 0; k < n; ++k) {
+        const Real ar = re[k], ai = im[k], br = re[n - k], bi = im[n - k];
+        x[k] = scale * (wr[k] * (ar + br) - wi[k] * (ai - bi));
+        y[k] = scale * (wr[k] * (ai + bi) + wi[k] * (ar - br));
+    }
+}
+
+/// from_cosine along a row: V(k) = w* (C(k) - i C(n-k)) for C = x + i y, the same formula for all k but the first.
+template <class Real>
+void row_from_cosine(const Direction<Real>& d, std::size_t n, const Real* __restrict x, const Real* __restrict y,
+                     Complex<Real>* __restrict row)
+{
+    const Real *wr = d.twiddle_re.data(), *wi = d.twiddle_im.data();
+    row[0] = {x[0], y[0]};
+    for (std::size_t k = 1; k < n; ++k) {
+        const Real re = x[k] + y[n - k], im = y[k] - x[n - k];
+        row[k] = {wr[k] * re + wi[k] * im, wr[k] * im - wi[k] * re};
+    }
+}
+
 }  // namespace
 
 template <class Real>
@@ -92,16 +128,19 @@ struct CosinePlanes<Real>::Impl {
     using Fft = Fftw<Real>;
     std::size_t na, nb;
     Direction<Real> a, b;
-    PlanOf<Real> forth, back;
+    /// Rows from one array to another, columns in place: planned as one, without measuring, they take up to twice as long.
+    struct PlanePlan {
+        PlanOf<Real> rows, columns;
+    };
+    PlanePlan forth, back;
 
     Impl(std::size_t na_, std::size_t nb_) : na(na_), nb(nb_), a(na_), b(nb_)
     {
-        Buffers sample = buffers();
+        const Buffers sample = buffers();
         const std::lock_guard lock(planner_mutex());
-        forth.plan = Fft::plan_dft_2d(int(nb), int(na), raw(*sample.in), raw(*sample.out), FFTW_FORWARD, FFTW_ESTIMATE);
-        back.plan = Fft::plan_dft_2d(int(nb), int(na), raw(*sample.in), raw(*sample.out), FFTW_BACKWARD, FFTW_ESTIMATE);
+        plan(forth, sample, FFTW_FORWARD);
+        plan(back, sample, FFTW_BACKWARD);
     }
-    /// From one array to another: in place FFTW would copy to and fro.
     struct Buffers {
         Buffer *in, *out;
     };
@@ -112,7 +151,17 @@ struct CosinePlanes<Real>::Impl {
         return {&in, &out};
     }
     static typename Fft::Complex* raw(Buffer& buffer) { return reinterpret_cast<typename Fft::Complex*>(buffer.data()); }
-    static void transform(const PlanOf<Real>& plan, const Buffers& of) { Fft::execute_dft(plan.plan, raw(*of.in), raw(*of.out)); }
+    void plan(PlanePlan& to, const Buffers& of, int sign) const
+    {
+        const int m = int(na), n = int(nb);
+        to.rows.plan = Fft::plan_many_dft(1, &m, n, raw(*of.in), nullptr, 1, m, raw(*of.out), nullptr, 1, m, sign, FFTW_ESTIMATE);
+        to.columns.plan = Fft::plan_many_dft(1, &n, m, raw(*of.out), nullptr, m, 1, raw(*of.out), nullptr, m, 1, sign, FFTW_ESTIMATE);
+    }
+    static void transform(const PlanePlan& with, const Buffers& of)
+    {
+        Fft::execute_dft(with.rows.plan, raw(*of.in), raw(*of.out));
+        Fft::execute_dft(with.columns.plan, raw(*of.out), raw(*of.out));
+    }
 };
 
 template <class Real>
@@ -134,28 +183,22 @@ void CosinePlanes<Real>::forward(Real* first, Real* second) const
     Impl::transform(impl_->forth, buffers);
     auto& buffer = *buffers.out;
     for (std::size_t k = 1; k <= nb / 2; ++k) {
-        const Number w = impl_->b.twiddle[k];
+        const Number w = impl_->b.twiddle(k);
         Number *low = buffer.data() + k * na, *high = buffer.data() + (nb - k) * na;
         if (low == high)  // the middle row is its own partner
             for (std::size_t i = 0; i < na; ++i) low[i] = w * low[i] + conj(w) * low[i];
         else
             for (std::size_t i = 0; i < na; ++i) to_cosine(w, low[i], high[i]);
     }
+    // parted a row ahead: what has just been written cannot be read backwards without waiting
+    thread_local std::vector<Real> parts, unused;
+    parts.resize(4 * (na + 1)), unused.resize(na);
+    const auto re = [&](std::size_t j) { return parts.data() + 2 * (j % 2) * (na + 1); };
+    part(buffer.data(), na, re(0), re(0) + na + 1);
     for (std::size_t j = 0; j < nb; ++j) {
-        Number* row = buffer.data() + j * na;
-        const Real scale = j == 0 ? Real(2) : Real(1);  // row 0 has no partner either: C(0) = 2 V(0)
-        Real *x = first + j * na, *y = second ? second + j * na : nullptr;
-        const auto put = [&](std::size_t i, Number value) {
-            x[i] = scale * value.re;
-            if (y) y[i] = scale * value.im;
-        };
-        put(0, row[0] + row[0]);
-        for (std::size_t i = 1; i <= na / 2; ++i) {
-            Number low = row[i], high = row[na - i];
-            to_cosine(impl_->a.twiddle[i], low, high);
-            put(na - i, high);
-            put(i, low);  // last: in the middle of an even row both are the same entry, and `low` is right
-        }
+        if (j + 1 < nb) part(buffer.data() + (j + 1) * na, na, re(j + 1), re(j + 1) + na + 1);
+        const Real scale = j == 0 ? Real(2) : Real(1);  // row 0 has no partner: C(0) = 2 V(0)
+        row_to_cosine(impl_->a, na, scale, re(j), re(j) + na + 1, first + j * na, second ? second + j * na : unused.data());
     }
 }
 
@@ -166,19 +209,11 @@ void CosinePlanes<Real>::backward(Real* first, Real* second) const
     const std::size_t na = impl_->na, nb = impl_->nb;
     const auto buffers = impl_->buffers();
     auto& buffer = *buffers.in;
-    for (std::size_t j = 0; j < nb; ++j) {
-        Number* row = buffer.data() + j * na;
-        const Real *x = first + j * na, *y = second ? second + j * na : nullptr;
-        row[0] = {x[0], y ? y[0] : Real(0)};
-        for (std::size_t i = 1; i <= na / 2; ++i) {
-            Number low = {x[i], y ? y[i] : Real(0)}, high = {x[na - i], y ? y[na - i] : Real(0)};
-            from_cosine(impl_->a.twiddle[i], low, high);
-            row[i] = low;
-            row[na - i] = high;
-        }
-    }
+    const std::vector<Real> none(second ? 0 : na);
+    for (std::size_t j = 0; j < nb; ++j)
+        row_from_cosine(impl_->a, na, first + j * na, second ? second + j * na : none.data(), buffer.data() + j * na);
     for (std::size_t k = 1; k <= nb / 2; ++k) {
-        const Number w = impl_->b.twiddle[k];
+        const Number w = impl_->b.twiddle(k);
         Number *low = buffer.data() + k * na, *high = buffer.data() + (nb - k) * na;
         for (std::size_t i = 0; i < na; ++i) {
             Number p = low[i], q = high[i];

@@ -19,7 +19,7 @@ struct Fftw<double> {
     using Complex = fftw_complex;
     static constexpr auto plan_r2r_2d = fftw_plan_r2r_2d;
     static constexpr auto plan_many_r2r = fftw_plan_many_r2r;
-    static constexpr auto plan_dft_2d = fftw_plan_dft_2d;
+    static constexpr auto plan_many_dft = fftw_plan_many_dft;
     static constexpr auto execute_r2r = fftw_execute_r2r;
     static constexpr auto execute_dft = fftw_execute_dft;
     static constexpr auto destroy = fftw_destroy_plan;
@@ -31,7 +31,7 @@ struct Fftw<float> {
     using Complex = fftwf_complex;
     static constexpr auto plan_r2r_2d = fftwf_plan_r2r_2d;
     static constexpr auto plan_many_r2r = fftwf_plan_many_r2r;
-    static constexpr auto plan_dft_2d = fftwf_plan_dft_2d;
+    static constexpr auto plan_many_dft = fftwf_plan_many_dft;
     static constexpr auto execute_r2r = fftwf_execute_r2r;
     static constexpr auto execute_dft = fftwf_execute_dft;
     static constexpr auto destroy = fftwf_destroy_plan;
