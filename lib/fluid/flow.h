@@ -118,6 +118,8 @@ class Poisson;
 namespace detail {
 struct FaceRange;
 struct Stage;
+template <class Real>
+struct ComponentView;
 }
 
 class Flow {
@@ -215,6 +217,8 @@ private:
     void sweep(const detail::Stage& stage);
     void start_next_stage();
     void run_stages(double dt);
+    template <class Real, bool porous, Convection convection>
+    double side_flux(const detail::ComponentView<Real>& view, int direction, int side) const;
     template <class Real, bool porous, Convection convection>
     Eigen::Vector3d boundary_flux_rate() const;
     template <class Real, Convection convection>

@@ -151,6 +151,40 @@ void Flow::build_volume_flux()
     });
 }
 
+/// Sum of the momentum fluxes of a component through the low sides of its control volumes at one side of the domain, upwards [m2/s2].
+template <class Real, bool porous, Convection convection>
+double Flow::side_flux(const ComponentView<Real>& view, int direction, int side) const
+{
+    const FaceRange range(grid_, view.axis);
+    const std::ptrdiff_t inwards = side == 0 ? layout_.stride[direction] : -layout_.stride[direction];
+    // half of the control volume of an outlet face is outside: the flux at the face is the mean of both sides
+    const bool mean = direction == view.axis && grid_.outlet(direction, side);
+    const auto flux = [&](std::ptrdiff_t f) {
+        const Real at_side = low_flux<porous, convection>(view, direction, f);
+        return mean ? Real(0.5) * (at_side + low_flux<porous, convection>(view, direction, f + inwards)) : at_side;
+    };
+    const int place = side == 0 ? range.low[direction] : range.high[direction];
+    double sum = 0.0;
+    if (direction == 0) {
+        for (int k = range.low.z(); k < range.high.z(); ++k)
+            for (int j = range.low.y(); j < range.high.y(); ++j) {
+                const double weight = view.axis == 0 ? 1.0 : detail::row_weight(grid_, view.axis, j, k);
+                sum += weight * double(flux(std::ptrdiff_t(layout_.index(place, j, k))));
+            }
+        return sum;
+    }
+    const int other = 3 - direction;
+    for (int n = range.low[other]; n < range.high[other]; ++n) {
+        const int j = direction == 1 ? place : n, k = direction == 1 ? n : place;
+        const auto f0 = std::ptrdiff_t(layout_.index(range.low.x(), j, k));
+        const auto value = [&](std::ptrdiff_t i) { return flux(f0 + i); };
+        const auto lanes = [](std::ptrdiff_t m, const auto& v) { return detail::lane_sum(m, v); };
+        sum += direction == view.axis ? lanes(range.row_length(), value)
+                                      : detail::weighted_row(grid_, view.axis, range, j, k, lanes, value);
+    }
+    return sum;
+}
+
 /// Momentum entering the fluid through the domain's sides per time [N], with the same fluxes as the sweep.
 template <class Real, bool porous, Convection convection>
 Eigen::Vector3d Flow::boundary_flux_rate() const
@@ -158,30 +192,10 @@ Eigen::Vector3d Flow::boundary_flux_rate() const
     Eigen::Vector3d total = Eigen::Vector3d::Zero();
     for (int axis = 0; axis < 3; ++axis) {
         const ComponentView<Real> view = view_of<Real, porous>(axis, layout_, velocity_, volume_flux_, porous_.void_fraction,
-                                                   options_.kinematic_viscosity / grid_.cell);
-        const FaceRange range(grid_, axis);
-        for (int d = 0; d < 3; ++d) {
-            if (grid_.periodic(d)) continue;
-            const int a = d == 0 ? 1 : 0, b = d == 2 ? 1 : 2;
-            const std::ptrdiff_t s = layout_.stride[d];
-            for (int side = 0; side < 2; ++side) {
-                double sum = 0.0;
-                Eigen::Vector3i c;
-                c[d] = side == 0 ? range.low[d] : range.high[d];
-                for (c[b] = range.low[b]; c[b] < range.high[b]; ++c[b])
-                    for (c[a] = range.low[a]; c[a] < range.high[a]; ++c[a]) {
-                        const auto f = std::ptrdiff_t(layout_.index(c.x(), c.y(), c.z()));
-                        double flux = double(low_flux<porous, convection>(view, d, f));
-                        // half of the control volume of an outlet face is outside: the flux at the face is the mean of
-                        // both sides
-                        if (d == axis && grid_.outlet(d, side))
-                            flux = 0.5 * (flux + double(low_flux<porous, convection>(view, d, side == 0 ? f + s : f - s)));
-                        const double weight = axis == d ? 1.0 : detail::face_weight(grid_, axis, c[axis]);
-                        sum += weight * flux;
-                    }
-                total[axis] += side == 0 ? sum : -sum;
-            }
-        }
+                                                               options_.kinematic_viscosity / grid_.cell);
+        for (int d = 0; d < 3; ++d)
+            if (!grid_.periodic(d))
+                total[axis] += side_flux<Real, porous, convection>(view, d, 0) - side_flux<Real, porous, convection>(view, d, 1);
     }
     return options_.density * grid_.cell * grid_.cell * total;
 }

@@ -143,4 +143,20 @@ void poisson_solve(benchmark::State& state)
 }
 BENCHMARK(poisson_solve)->ArgNames({"cells_x", "bits"})->ArgsProduct({{60, 120, 240}, {64, 32}})->Unit(benchmark::kMillisecond)->UseRealTime();
 
+/// a = b + s c on arrays of the size of a field: what memory gives at best. Bytes as counted by the loop: two read, one written.
+void triad(benchmark::State& state)
+{
+    const std::size_t n = Layout(domain(static_cast<int>(state.range(0))).cells).total;
+    in_precision(options(state).precision, [&]<class Real>(Real) {
+        std::vector<Real, CacheAligned<Real>> a(n, Real(0)), b(n, Real(1)), c(n, Real(2));
+        for (auto _ : state) {
+            for (std::size_t i = 0; i < n; ++i) a[i] = b[i] + Real(3) * c[i];
+            benchmark::DoNotOptimize(a.data());
+            benchmark::ClobberMemory();
+        }
+        state.SetBytesProcessed(state.iterations() * static_cast<std::int64_t>(3 * n * sizeof(Real)));
+    });
+}
+BENCHMARK(triad)->ArgNames({"cells_x", "bits"})->ArgsProduct({{60, 120, 240}, {64, 32}})->Unit(benchmark::kMillisecond)->UseRealTime();
+
 }  // namespace

@@ -50,13 +50,13 @@ def run(arguments, folder, **settings):
 
 
 class Ours:
-    def __init__(self, program, folder, centres, cells):
+    def __init__(self, program, folder, centres, cells, precision):
         self.program, self.folder = program, folder
         faces = "".join(f'"{axis}{side}" = {{ type = "slip" }}\n' for axis in "xy" for side in "-+")
         bodies = "".join(f'[[body]]\nshape = {{ type = "sphere", diameter = {diameter} }}\nposition = {list(centre)}\nmotion = "fixed"\n' for centre in centres)
         self.text = (f'[domain]\nsize = {list(size)}\ncell = {size[0] / cells!r}\n[boundary]\n{faces}'
                      f'"z+" = {{ type = "inlet", velocity = [0, 0, {-speed}] }}\n"z-" = {{ type = "outlet", pressure = 0 }}\n'
-                     f'[fluid]\ndensity = {density}\nkinematic_viscosity = {viscosity}\n[gravity]\nvector = [0, 0, 0]\n{bodies}')
+                     f'[fluid]\ndensity = {density}\nkinematic_viscosity = {viscosity}\nprecision = "{precision}"\n[gravity]\nvector = [0, 0, 0]\n{bodies}')
 
     def run(self, duration, interval):
         shutil.rmtree(self.folder, ignore_errors=True)
@@ -171,25 +171,27 @@ def main():
     work, program = os.path.abspath(options.work), os.path.join(os.path.abspath(options.bin), "suffuse")
     centres = bed(options.seed)
     print(f"{count} fixed spheres of {1e3 * diameter:g} mm, seed {options.seed}, {speed} m/s, one core each\n")
-    row("code", "cells across", "time step [us]", "ms a step (CPU)", "ms a step / ours", "CPU s for a second of flow", "pressure drop [Pa]", "off ours on fine cells")
-    row(*["---"] * 8)
+    row("code", "cells across", "time step [us]", "ms a step (CPU)", "over ours in double", "in single", "CPU s for a second of flow", "pressure drop [Pa]", "off ours on fine cells")
+    row(*["---"] * 9)
     ours = {}
     for cells in (options.fine, options.coarse):
-        ours[cells] = Ours(program, f"{work}/ours-{cells}", centres, cells)
-        ours[cells].run(options.duration, options.duration / 50)
-    reference = late_mean(ours[options.fine].drops())
+        for precision in ("double", "single"):
+            run_of_ours = ours[cells, precision] = Ours(program, f"{work}/ours-{cells}-{precision}", centres, cells, precision)
+            run_of_ours.run(options.duration, options.duration / 50)
+    reference = late_mean(ours[options.fine, "double"].drops())
 
     def report(name, cells, step, seconds, drop):
         off = "" if drop is None else f"{100 * (drop / reference - 1):+.1f} %"
-        row(name, cells, f"{1e6 * step:.0f}", f"{1e3 * seconds:.1f}", f"{seconds / ours[cells].step()[1]:.0f}", f"{seconds / step:.0f}",
+        ratios = (f"{seconds / ours[cells, precision].step()[1]:.3g}" for precision in ("double", "single"))
+        row(name, cells, f"{1e6 * step:.0f}", f"{1e3 * seconds:.1f}", *ratios, f"{seconds / step:.0f}",
             "" if drop is None else f"{drop:.1f}", off)
 
-    for cells in ours:
-        report("Coralsand", cells, *ours[cells].step(), late_mean(ours[cells].drops()))
+    for (cells, precision), run_of_ours in ours.items():
+        report(f"Coralsand, {precision}", cells, *run_of_ours.step(), late_mean(run_of_ours.drops()))
     if not shutil.which("pimpleFoam"):
         print("pimpleFoam is not installed: left out (Debian: apt-get install openfoam)", file=sys.stderr)
         return
-    for cells in ours:
+    for cells in (options.fine, options.coarse):
         step, duration = (options.step, options.duration) if cells == options.coarse else (options.step / 4, options.steps * options.step / 4)
         seconds, drops = OpenFoam(f"{work}/openfoam-{cells}", centres, cells).run(duration, step)
         report("pimpleFoam", cells, step, statistics.fmean(seconds[2:]), late_mean(drops) if cells == options.coarse else None)
