@@ -20,11 +20,12 @@ ImmersedBodies::ImmersedBodies(ImmersedBodies&&) noexcept = default;
 ImmersedBodies& ImmersedBodies::operator=(ImmersedBodies&&) noexcept = default;
 ImmersedBodies::~ImmersedBodies() = default;
 
-std::size_t ImmersedBodies::add(BodyShape shape, const RigidMotion& motion)
+std::size_t ImmersedBodies::add(BodyShape shape, const RigidMotion& motion, bool still)
 {
     auto body = std::make_unique<Body>();
     body->shape = std::move(shape);
     body->placed = motion;
+    body->still = still;
     bodies_.push_back(std::move(body));
     actions_.emplace_back();
     driven_steps_.push_back(0);

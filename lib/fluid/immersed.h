@@ -73,7 +73,9 @@ public:
     ~ImmersedBodies();
 
     /// Adds a body; its index is returned. Faces are found at the next place().
-    std::size_t add(BodyShape shape, const RigidMotion& motion);
+    /// \param still  it has the same motion in measure() and apply() of every step, so that the former can do the latter's work on its
+    /// faces while they are in the cache
+    std::size_t add(BodyShape shape, const RigidMotion& motion, bool still = false);
     std::size_t size() const { return bodies_.size(); }
 
     /// Finds the faces of bodies that moved by more than reshape_distance since their faces were last found.

@@ -355,6 +355,7 @@ std::span<const FluidAction> ImmersedBodies::measure(Flow& flow, double dt, std:
                 measure_runs<Real, c, porous>(flow, body.own[c].runs, carrier, action);
                 mean_slip[b][c] = action.force[c] / std::max(1.0, body.run_mass[c]);
                 measure_cuts<Real, c, porous>(flow, options_, dt, body.own[c], carrier, action);
+                if (body.still) body.given[c] = force_faces<Real, c, porous>(flow, body.own[c], carrier);
             };
             in_precision(flow.options().precision, [&]<class Real>(Real) {
                 flow.porous() ? add.template operator()<Real, true>() : add.template operator()<Real, false>();
@@ -402,9 +403,10 @@ void ImmersedBodies::apply(Flow& flow, std::span<const RigidMotion> motions)
     Vector3d impulse = parallel_sum(bodies_.size(), 1, Vector3d(0.0, 0.0, 0.0), [&](std::size_t b, std::size_t) {
         const Body& body = *bodies_[b];
         const Carrier& carrier = carriers[b];
-        Vector3d part = Vector3d::Zero();
+        Vector3d part = body.given;
         for_each_component([&](auto component) {
             constexpr int c = component;
+            if (body.still) return;
             part[c] = in_precision(flow.options().precision, [&]<class Real>(Real) {
                 return flow.porous() ? force_faces<Real, c, true>(flow, body.own[c], carrier)
                                      : force_faces<Real, c, false>(flow, body.own[c], carrier);

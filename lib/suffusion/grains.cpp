@@ -59,7 +59,7 @@ Grains::Grains(const Scene& scene, const fluid::GridSpec& grid)
         if (scene.bodies[i].scheme != Scheme::resolved) continue;
         const int id = static_cast<int>(i);
         bodies_.push_back(id);
-        immersed_.add(flow_shape(scene.world.shape(id), scene.world.scale(id)), motion_of(scene, id));
+        immersed_.add(flow_shape(scene.world.shape(id), scene.world.scale(id)), motion_of(scene, id), scene.world.motion(id) == dem::Motion::fixed);
         const double displaced = density_ * scene.bodies[i].volume;
         virtual_mass_.push_back(scene.bodies[i].mass < light_ratio * displaced ? virtual_share * displaced : 0);
     }
@@ -70,7 +70,7 @@ Grains::Grains(const Scene& scene, const fluid::GridSpec& grid)
         const Eigen::Vector2d hole = scene.hole_centre();
         for (int axis = 0; axis < 2; ++axis) plate_.position[axis] = hole[axis] + plate->pitch * std::round((middle[axis] - hole[axis]) / plate->pitch);
         plate_.position.z() = plate->z - 0.5 * plate->thickness;
-        immersed_.add(fluid::plate_shape(plate->thickness, plate->hole, plate->pitch, half), plate_);
+        immersed_.add(fluid::plate_shape(plate->thickness, plate->hole, plate->pitch, half), plate_, true);
     }
     motions_.resize(immersed_.size());
     before_.assign(bodies_.size(), Vector3d::Zero());

@@ -423,6 +423,29 @@ TEST(ImmersedBodies, give_the_same_bits_with_one_and_two_threads_and_after_a_res
     for (const FlowField& result : results) EXPECT_EQ(result, results[0]);
 }
 
+TEST(ImmersedBodies, that_are_still_do_the_same_to_the_flow)
+{
+    GridSpec grid = cube(16, 1e-3, BoundaryKind::periodic);
+    std::vector<RigidMotion> motions{at(Vector3d(5.2e-3, 7e-3, 8e-3)), at(Vector3d(11e-3, 8.4e-3, 7e-3)), at(Vector3d(2e-3, 14e-3, 14e-3), Vector3d(0.01, 0.0, 0.0))};
+    const auto run = [&](bool still) {
+        FlowOptions options;
+        options.body_acceleration = {1.0, 0.2, -0.5};
+        options.scheme = TimeScheme::runge_kutta;  // it holds the forcing of the last step
+        Flow flow(grid, options);
+        ImmersedBodies bodies(grid);
+        for (std::size_t b = 0; b < motions.size(); ++b) bodies.add(sphere_shape(7e-3), motions[b], still && b < 2);  // the first two share faces
+        bodies.place(motions);
+        for (int step = 0; step < 5; ++step) coupled_step(flow, bodies, motions, flow.stable_time_step());
+        EXPECT_LT(flow.momentum().relative_error(), 1e-12);
+        std::vector<Vector3d> impulses(bodies.impulses().begin(), bodies.impulses().end());
+        return std::pair(flow.velocity(0), impulses);
+    };
+    const auto [velocity, impulses] = run(false);
+    const auto [velocity_still, impulses_still] = run(true);
+    EXPECT_EQ(velocity, velocity_still);
+    for (std::size_t b = 0; b < impulses.size(); ++b) EXPECT_EQ(impulses[b], impulses_still[b]);
+}
+
 TEST(ImmersedBodies, let_the_sphere_of_ten_cate_fall_as_measured)
 {
     // E4, Re 31.9, 8 cells per diameter, one quarter of the tank with two symmetry planes; peak 0.1226 m/s

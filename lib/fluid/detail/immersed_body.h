@@ -27,6 +27,8 @@ struct OwnFaces {
 struct ImmersedBodies::Body {
     BodyShape shape;
     RigidMotion placed;
+    bool still = false;                          ///< moves alike in measure() and apply()
+    Eigen::Vector3d given = Eigen::Vector3d::Zero();  ///< to the fluid on own faces in measure(), where it is `still`; sum of eps times the change
     bool found = false;                          ///< faces belong to `placed`
     std::array<detail::SolidSet, 4> solid;       ///< components and cells
     std::array<detail::OwnFaces, 3> own;         ///< without the faces shared with other bodies...
