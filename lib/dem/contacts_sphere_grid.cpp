@@ -136,20 +136,20 @@ private:
 
 /// Whether a second wall is about to touch a sphere that its nearest wall touches. Away from one wall the distance grows with the way; it grows
 /// less where another one is at an angle a: found from a gap of s (1 - cos a) on, s the way.
-bool World::Impl::is_cornered(std::size_t i, std::size_t j) const
+bool World::Impl::is_cornered(std::size_t i, std::size_t j, detail::CellMemory& here, detail::CellMemory& beyond) const
 {
     constexpr double way = 0.45, least = 0.01, near = 0.02;  // of the radius
     const Shape& master = *shapes[std::size_t(shape[j])];
     if (master.kind() != ShapeKind::grid) return false;
-    const sdf::DistanceGrid& grid = master.distance_grid();
+    const detail::DistanceField field(master);
     const double r = radius[i] / scale[j];
     const Vec3 local = q[j].conjugate() * periodic(x[i] - x[j]) / scale[j];
     Vec3 gradient;
-    const double distance = grid.sample_with_gradient(local, gradient), slope = gradient.norm();
+    const double distance = field.distance_and_gradient(local, gradient, here), slope = gradient.norm();
     if (distance > (1.0 + near) * r) return false;
     if (slope < 0.5) return true;  // amid walls
     const Vec3 further = local + (way * r / slope) * gradient;
-    return grid.inside_box(further) && grid.sample(further) < distance + (way - least) * r;
+    return field.grid->inside_box(further) && field.distance(further, beyond) < distance + (way - least) * r;
 }
 
 /// The sphere of pair k pressed on the surface of its grid. \returns whether it touches
@@ -381,7 +381,7 @@ void World::Impl::sphere_grid_loop(double dt)
             const std::size_t k = std::size_t(l.near[n]);
             ++s.node_queries;
             if (automatic && !(l.within[k] > 0.0) && (dt <= 0.0 || (k + std::size_t(counters.steps)) % looks == 0) &&
-                is_cornered(std::size_t(l.sphere[k]), std::size_t(l.grid[k])))
+                is_cornered(std::size_t(l.sphere[k]), std::size_t(l.grid[k]), l.press[k].cell, l.beyond[k]))
                 make_pocket_here(k);
             if (!nearest && l.within[k] > 0.0 ? press_on_walls(k, dt, *out, s, crossing) : press_on_nearest(k, dt, *out, s, crossing)) ++out;
         }

@@ -125,7 +125,7 @@ void World::restore(std::span<const std::uint8_t> state)
     m.nodes.unlisted.assign(m.nodes.slave.size(), 0.0F);
     m.spheres.make_room();
     m.sphere_walls.make_room();
-    m.sphere_grids.near.resize(m.sphere_grids.sphere.size());
+    m.sphere_grids.make_room();
 }
 
 }  // namespace coral::dem

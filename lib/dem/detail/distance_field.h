@@ -47,11 +47,17 @@ struct DistanceField {
     {
         return grid ? remembered(p, gradient, memory) : polyhedron->depth_and_normal(p, gradient);
     }
+    /// \pre a lattice, and the point lies in its box
+    double distance(const Eigen::Vector3d& p, CellMemory& memory) const { return sdf::detail::interpolate(cell_of(p, memory)); }
 
 private:
     double remembered(const Eigen::Vector3d& p, Eigen::Vector3d& gradient, CellMemory& memory) const
     {
         if (!grid->inside_box(p)) return grid->sample_with_gradient(p, gradient);
+        return sdf::detail::interpolate_with_gradient(cell_of(p, memory), 1.0 / grid->spacing, gradient);
+    }
+    sdf::detail::Cell cell_of(const Eigen::Vector3d& p, CellMemory& memory) const
+    {
         sdf::detail::Cell cell = sdf::detail::cell_at(*grid, p);
         const auto at = std::int32_t(cell.corner - grid->distance.data());
         if (memory.at != at) {
@@ -61,7 +67,7 @@ private:
         cell.corner = memory.values;
         cell.row = 2;
         cell.layer = 4;
-        return sdf::detail::interpolate_with_gradient(cell, 1.0 / grid->spacing, gradient);
+        return cell;
     }
 };
 

@@ -178,8 +178,15 @@ struct SphereGridList {
     std::vector<double> within;  ///< of that place, so far it goes [m]; 0: the nearest wall alone pushes
     std::vector<Vec3> listed;    ///< centre of the sphere when the triangles near it were last gathered [m]
     std::vector<Pocket> pocket;
-    std::vector<Index> near;  ///< for the loop: entries that may touch, block by block
+    std::vector<detail::CellMemory> beyond;  ///< where a second wall was looked for; not saved
+    std::vector<Index> near;                 ///< for the loop: entries that may touch, block by block
     std::vector<GeneralForce> out;
+    /// Of what only the loop needs, for the entries that are there.
+    void make_room()
+    {
+        beyond.assign(sphere.size(), {});
+        near.resize(sphere.size());
+    }
 };
 
 /// A surface node that touches, and what it keeps from one step to the next: all at the end of the last step, world frame.
@@ -354,7 +361,7 @@ struct World::Impl {
     void sphere_wall_loop(double dt);
     void sphere_grid_loop(double dt);
     bool press_on_walls(std::size_t k, double dt, GeneralForce& out, LoopSums& s, std::vector<Crossing>& crossing);
-    bool is_cornered(std::size_t sphere, std::size_t grid) const;
+    bool is_cornered(std::size_t sphere, std::size_t grid, detail::CellMemory& here, detail::CellMemory& beyond) const;
     void make_pocket(std::size_t k);
     void gather_pocket(std::size_t k);
     void make_pocket_here(std::size_t k);
