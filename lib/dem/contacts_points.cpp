@@ -44,29 +44,10 @@ struct Members {
     }
 };
 
-/// Laws of the contacts; one for all where there is one material.
 template <class LawOf>
 [[gnu::always_inline]] inline void take_law(const Members& m, bool one_law, const LawOf& law_of, PointGroup& g)
 {
-    if (one_law) {
-        const PairLaw& law = law_of(m[0]);
-        g.kn = all<Lanes>(law.kn);
-        g.kt = all<Lanes>(law.spring());
-        g.friction = all<Lanes>(law.friction);
-        g.give = all<Lanes>(law.give());
-        g.cn = all<Lanes>(law.cn);
-        g.ct = all<Lanes>(law.ct);
-        return;
-    }
-    const PairLaw* law[lane_count];
-    for (int k = 0; k < lane_count; ++k) law[k] = &law_of(m[k]);
-    const auto numbers = [&](const auto& of) { return detail::lanes_from<Lanes>([&](int k) { return of(*law[k]); }); };
-    g.kn = numbers([](const PairLaw& l) { return l.kn; });
-    g.kt = numbers([](const PairLaw& l) { return l.spring(); });
-    g.friction = numbers([](const PairLaw& l) { return l.friction; });
-    g.give = numbers([](const PairLaw& l) { return l.give(); });
-    g.cn = numbers([](const PairLaw& l) { return l.cn; });
-    g.ct = numbers([](const PairLaw& l) { return l.ct; });
+    detail::take_law(one_law, [&](int k) -> const PairLaw& { return law_of(m[k]); }, g);
 }
 
 [[gnu::always_inline]] inline void take_memory(const Members& m, const std::vector<PointMemory>& memory, PointGroup& g)

@@ -1,10 +1,11 @@
-// Contact of spheres with grids and polyhedra: one query of the distance at the centre, or pressed on every wall of a grid.
+// Contact of spheres with grids and polyhedra: with the nearest wall (contacts_nearest.cpp), or pressed on every wall of a grid.
 #include <bit>
 #include <cmath>
 #include <numbers>
 
 #include "core/parallel.h"
 #include "dem/detail/impl.h"
+#include "dem/detail/nearest_walls.h"
 
 namespace coral::dem {
 
@@ -13,37 +14,7 @@ namespace {
 using detail::Lanes;
 
 constexpr std::size_t fetched_quads = 2;  ///< triangles are asked for so many quads ahead
-constexpr double same_wall = 0.8;  ///< cosine: places on a sphere within 37 degrees of each other share a friction spring
-
-/// Slot of the wall with this normal (frame of the grid), or a new one.
-int slot_of(Slots& slots, const Vec3& normal)
-{
-    for (int k = 0; k < Slots::nearest; ++k)
-        if ((slots.used >> k & 1) && slots.normal[k].dot(normal) > same_wall) {
-            slots.normal[k] = normal;
-            return k;
-        }
-    int k = 0;
-    while (k < Slots::nearest && (slots.used >> k & 1)) ++k;
-    if (k == Slots::nearest) {
-        k = slots.next;
-        slots.next = std::uint8_t((slots.next + 1) % Slots::nearest);
-    }
-    slots.used = std::uint8_t(slots.used | 1 << k);
-    slots.spring[k].setZero();
-    slots.normal[k] = normal;
-    return k;
-}
-
-/// Whether a touching sphere has another wall than in the last step: its normal has turned by more than a surface under it can.
-bool changes_wall(const Slots& slots, const Vec3& normal)
-{
-    constexpr double least = 0.995;  // cosine of 6 degrees
-    if (slots.used == 0) return false;
-    for (int k = 0; k < Slots::count; ++k)
-        if ((slots.used >> k & 1) && slots.normal[k].dot(normal) < least) return true;
-    return false;
-}
+constexpr double same_wall = Slots::same_wall;
 
 /// Overlap of a ball with the plane on which it would store as much (facet_quads.h), at most its radius. The energy is kn `stored` [m2].
 /// Unlike twice the energy over the force it stays finite between walls that push against each other.
@@ -250,62 +221,6 @@ bool World::Impl::press_on_walls(std::size_t k, double dt, GeneralForce& out, Lo
     return true;
 }
 
-/// The same with its nearest wall alone.
-bool World::Impl::press_on_nearest(std::size_t k, double dt, GeneralForce& out, LoopSums& s, std::vector<Crossing>& crossing)
-{
-    SphereGridList& l = sphere_grids;
-    const std::size_t i = std::size_t(l.sphere[k]), j = std::size_t(l.grid[k]);
-    const detail::DistanceField field(*shapes[std::size_t(shape[j])]);
-    const Vec3 offset = periodic(x[i] - x[j]);
-    Vec3 local_gradient;
-    const double overlap = radius[i] - scale[j] * field.distance_and_gradient(q[j].conjugate() * offset / scale[j], local_gradient, l.press[k].cell);
-    const bool touching = overlap > 0.0;
-    if (!touching && l.touch[k] == 0) return false;
-    const PairLaw& pair = law(material[i], material[j]);
-    const double slope = local_gradient.norm();
-    const Vec3 local_normal = slope > 1e-9 ? Vec3(local_gradient / slope) : Vec3::UnitZ();
-    const Vec3 n = q[j] * local_normal;
-    const double root_mass = std::sqrt(1.0 / (inverse_mass[i] + inverse_mass[j]));
-    PressMemory now;
-    now.cell = l.press[k].cell;
-    Slots& slots = l.slots[k];
-    out = {};
-    out.a = Index(i);
-    out.b = Index(j);
-    bool clamped = false;
-    if (touching) {
-        const double cap = options.overlap_cap * radius[i], pressed = std::min(overlap, cap), elastic = pair.kn * pressed * slope;
-        const double approach = (v_end[j] + w[j].cross(offset) - v_end[i]).dot(n), fn = normal_force(elastic, approach, pair, root_mass);
-        clamped = fn == 0.0;
-        const double arm_i = radius[i] - 0.5 * overlap;
-        const Vec3 arm_j = offset - arm_i * n;  // contact point, from the grid's centre
-        const Vec3 velocity = v[i] - v[j] - arm_i * w[i].cross(n) - w[j].cross(arm_j);
-        const Vec3 slide = velocity - n.dot(velocity) * n;
-        const bool turned = changes_wall(slots, local_normal);
-        Vec3& spring = slots.spring[slot_of(slots, local_normal)];
-        if (turned && options.sphere_scheme == SphereScheme::automatic && field.grid) make_pocket_here(k);
-        const detail::Friction friction = detail::rub({pair, n, slide, slide, 0.5 * (w[i] + w[j]).dot(n), root_mass}, fn, dt, spring);
-        out.points = 1;
-        out.overlap = overlap;
-        out.normal_force = fn * n;
-        out.tangential_force = friction.total;
-        out.torque_a = -arm_i * n.cross(friction.total);
-        out.torque_b = -arm_j.cross(out.normal_force + friction.total);
-        out.arm = -arm_i * n;
-        now.push.add(elastic * n, Vec3::Zero(), offset);
-        now.pull.add(friction.pull, out.arm, arm_j);
-        now.drag.add((fn - elastic) * n + (friction.total - friction.pull), out.arm, arm_j);
-        now.stored = pair.kn * pressed * (overlap - 0.5 * pressed);
-        now.stretched = 0.5 * pair.kt * spring.squaredNorm();
-        s.max_overlap = std::max(s.max_overlap, overlap / radius[i]);
-        s.deep += overlap > cap;
-    } else {
-        slots.used = 0;
-    }
-    close_books(k, now, clamped, dt, out, s, crossing);
-    return touching;
-}
-
 /// The energies of pair k after a step: what dashpots and friction took, and what the forces at both ends of the step did beside the change
 /// of what is stored, which goes back to the motion (see WorkError). Springs of slots that are left or opened count as slip.
 void World::Impl::close_books(std::size_t k, const PressMemory& now, bool clamped, double dt, GeneralForce& out, LoopSums& s,
@@ -350,6 +265,7 @@ void World::Impl::sphere_grid_loop(double dt)
         const std::size_t block = first / grid_grain;
         LoopSums s;
         std::vector<Crossing>& crossing = crossings[base + block];
+        detail::NearestWalls on_nearest(*this, dt, s, crossing);
         GeneralForce* const begin = l.out.data() + first;
         GeneralForce* out = begin;
         std::size_t count = first;
@@ -383,8 +299,10 @@ void World::Impl::sphere_grid_loop(double dt)
             if (automatic && !(l.within[k] > 0.0) && (dt <= 0.0 || (k + std::size_t(counters.steps)) % looks == 0) &&
                 is_cornered(std::size_t(l.sphere[k]), std::size_t(l.grid[k]), l.press[k].cell, l.beyond[k]))
                 make_pocket_here(k);
-            if (!nearest && l.within[k] > 0.0 ? press_on_walls(k, dt, *out, s, crossing) : press_on_nearest(k, dt, *out, s, crossing)) ++out;
+            if (!nearest && l.within[k] > 0.0 ? press_on_walls(k, dt, *out, s, crossing) : on_nearest.find(k, *out)) ++out;
         }
+        on_nearest.press();
+        on_nearest.add_sums();
         s.tests = std::int64_t(last - first);
         s.touching = out - begin;
         out_count[2][block] = std::int32_t(out - begin);

@@ -37,6 +37,20 @@ World meeting(int pairs)
     return world;
 }
 
+/// So many spheres that graze a block each, spinning, an even distance apart along y.
+World grazing(int pairs)
+{
+    World world = quiet_world(0.3, 0.4);
+    const int shape = world.add_shape(Shape::sphere()), block = world.add_shape(grid_block({2e-3, 2e-3, 2e-3}, 0.5e-3));
+    for (int k = 0; k < pairs; ++k) {
+        const double y = k / 64.0;
+        add_sphere(world, block, 1.0, {0, y, 0});
+        const int fine = add_sphere(world, shape, 1.5e-3, {0.3e-3, y, 2.77e-3});
+        world.set_velocity(fine, {0.4, 0, -0.2}, {0, -60, 0});
+    }
+    return world;
+}
+
 }  // namespace
 
 TEST(SideBySide, free_spheres_move_as_one_alone)
@@ -72,6 +86,29 @@ TEST(SideBySide, contacts_press_and_rub_as_one_alone)
         EXPECT_TRUE(touched);
         EXPECT_GT((lone.velocity(0) - Vec3(0.2, 0, 0.05)).norm(), 0.05) << "they have parted again";
         EXPECT_GT(std::abs(lone.angular_velocity(0).y() - 40), 1.0) << "and rubbed";
+        for (int b = 0; b < many.body_count(); ++b) {
+            EXPECT_EQ(many.velocity(b), lone.velocity(b % 2)) << b << " of " << pairs << " pairs";
+            EXPECT_EQ(many.angular_velocity(b), lone.angular_velocity(b % 2)) << b << " of " << pairs << " pairs";
+        }
+    }
+}
+
+TEST(SideBySide, fines_press_on_grains_as_one_alone)
+{
+    for (const int pairs : {2, 5, 8, 11}) {
+        World lone = grazing(1), many = grazing(pairs);
+        bool touched = false;
+        for (int k = 0; k < 400; ++k) {
+            lone.step(step);
+            many.step(step);
+            touched = touched || !lone.contacts().empty();
+        }
+        EXPECT_TRUE(touched);
+        EXPECT_GT(lone.velocity(1).z(), 0.05) << "it has sprung off";
+        EXPECT_GT(std::abs(lone.angular_velocity(1).y() + 60), 1.0) << "and rubbed";
+        EXPECT_GT(lone.angular_velocity(0).norm(), 0.1) << "and turned the grain";
+        const Energy e = lone.energy();
+        EXPECT_NEAR(e.closure, 0.0, 1e-9 * e.initial);
         for (int b = 0; b < many.body_count(); ++b) {
             EXPECT_EQ(many.velocity(b), lone.velocity(b % 2)) << b << " of " << pairs << " pairs";
             EXPECT_EQ(many.angular_velocity(b), lone.angular_velocity(b % 2)) << b << " of " << pairs << " pairs";

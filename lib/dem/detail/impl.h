@@ -134,6 +134,7 @@ struct SphereWallList {
 struct Slots {
     static constexpr int nearest = 3;  ///< as many are used where only the nearest wall pushes
     static constexpr int count = 6;    ///< a ball in a ring touches it all around
+    static constexpr double same_wall = 0.8;  ///< cosine: places on a sphere within 37 degrees of each other share a spring
     Vec3 spring[count] = {Vec3::Zero(), Vec3::Zero(), Vec3::Zero(), Vec3::Zero(), Vec3::Zero(), Vec3::Zero()};
     Vec3 normal[count] = {Vec3::Zero(), Vec3::Zero(), Vec3::Zero(), Vec3::Zero(), Vec3::Zero(), Vec3::Zero()};
     std::uint8_t used = 0, next = 0;
@@ -365,7 +366,6 @@ struct World::Impl {
     void make_pocket(std::size_t k);
     void gather_pocket(std::size_t k);
     void make_pocket_here(std::size_t k);
-    bool press_on_nearest(std::size_t k, double dt, GeneralForce& out, LoopSums& s, std::vector<Crossing>& crossing);
     void close_books(std::size_t k, const PressMemory& now, bool clamped, double dt, GeneralForce& out, LoopSums& s, std::vector<Crossing>& crossing);
     void node_loop(double dt);
     void sum_forces();

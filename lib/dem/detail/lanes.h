@@ -179,6 +179,54 @@ template <class Of>
 }
 #endif
 
+/// Four numbers of each lane that lie one after the other in memory.
+struct WideFours {
+    WideLanes a, b, c, d;
+};
+#ifdef CORAL_AVX512
+template <class Of>
+[[gnu::always_inline]] inline WideFours wide_fours(const Of& of)
+{
+    const auto both = [&](int k) { return __builtin_shufflevector(load(of(k)), load(of(k + 4)), 0, 1, 2, 3, 4, 5, 6, 7); };
+    const WideLanes k0 = both(0), k1 = both(1), k2 = both(2), k3 = both(3);
+    const WideLanes ac_01 = __builtin_shufflevector(k0, k1, 0, 8, 2, 10, 4, 12, 6, 14), bd_01 = __builtin_shufflevector(k0, k1, 1, 9, 3, 11, 5, 13, 7, 15);
+    const WideLanes ac_23 = __builtin_shufflevector(k2, k3, 0, 8, 2, 10, 4, 12, 6, 14), bd_23 = __builtin_shufflevector(k2, k3, 1, 9, 3, 11, 5, 13, 7, 15);
+    return {__builtin_shufflevector(ac_01, ac_23, 0, 1, 8, 9, 4, 5, 12, 13), __builtin_shufflevector(bd_01, bd_23, 0, 1, 8, 9, 4, 5, 12, 13),
+            __builtin_shufflevector(ac_01, ac_23, 2, 3, 10, 11, 6, 7, 14, 15), __builtin_shufflevector(bd_01, bd_23, 2, 3, 10, 11, 6, 7, 14, 15)};
+}
+/// Back to memory, each lane to to(k).
+template <class To>
+[[gnu::always_inline]] inline void put_fours(const WideFours& f, const To& to)
+{
+    const WideLanes ab_even = __builtin_shufflevector(f.a, f.b, 0, 8, 2, 10, 4, 12, 6, 14), ab_odd = __builtin_shufflevector(f.a, f.b, 1, 9, 3, 11, 5, 13, 7, 15);
+    const WideLanes cd_even = __builtin_shufflevector(f.c, f.d, 0, 8, 2, 10, 4, 12, 6, 14), cd_odd = __builtin_shufflevector(f.c, f.d, 1, 9, 3, 11, 5, 13, 7, 15);
+    const auto put = [&](int k, WideLanes pair) {
+        const Lanes low = __builtin_shufflevector(pair, pair, 0, 1, 2, 3), high = __builtin_shufflevector(pair, pair, 4, 5, 6, 7);
+        std::memcpy(to(k), &low, sizeof low);
+        std::memcpy(to(k + 4), &high, sizeof high);
+    };
+    put(0, __builtin_shufflevector(ab_even, cd_even, 0, 1, 8, 9, 4, 5, 12, 13));
+    put(1, __builtin_shufflevector(ab_odd, cd_odd, 0, 1, 8, 9, 4, 5, 12, 13));
+    put(2, __builtin_shufflevector(ab_even, cd_even, 2, 3, 10, 11, 6, 7, 14, 15));
+    put(3, __builtin_shufflevector(ab_odd, cd_odd, 2, 3, 10, 11, 6, 7, 14, 15));
+}
+#else
+template <class Of>
+[[gnu::always_inline]] inline WideFours wide_fours(const Of& of)
+{
+    const auto number = [&](int n) { return lanes_from<WideLanes>([&](int k) { return of(k)[n]; }); };
+    return {number(0), number(1), number(2), number(3)};
+}
+template <class To>
+[[gnu::always_inline]] inline void put_fours(const WideFours& f, const To& to)
+{
+    for (int k = 0; k < wide_lane_count; ++k) {
+        double* const at = to(k);
+        at[0] = f.a[k], at[1] = f.b[k], at[2] = f.c[k], at[3] = f.d[k];
+    }
+}
+#endif
+
 template <class V>
 [[gnu::always_inline]] inline Eigen::Vector3d lane(const VectorsOf<V>& v, int k)
 {

@@ -7,7 +7,7 @@
 /// half a step in the geometry of either end, which gives it just the work that the motion loses:
 ///     s_{n+1} = R (s_n + dt/2 u_n) + dt/2 u_{n+1}
 #include "dem/detail/impl.h"
-#include "dem/detail/lanes.h"
+#include "dem/detail/law_lanes.h"
 
 namespace coral::dem::detail {
 
@@ -15,13 +15,12 @@ namespace coral::dem::detail {
 #pragma GCC diagnostic ignored "-Wpsabi"
 
 /// Contacts of the same sort as they stand; lanes beyond the last contact repeat it.
-struct PointGroup {
+struct PointGroup : LawLanes {
     WideVec3Lanes normal, relative;  ///< of a against b; velocity in the middle of the step
     WideVec3Lanes spin_a, spin_b;
     WideLanes overlap, approach, root_mass;
     WideLanes radius_a, radius_b, share;  ///< arms of the contact point: radius - share overlap; b's is radius_b - (1 - share) overlap
     WideLanes smaller;                    ///< radius
-    WideLanes kn, kt, friction, give, cn, ct;
     WideVec3Lanes old_spring, old_normal, old_total;
     WideLanes old_overlap;
 };
@@ -50,25 +49,9 @@ struct PointResult {
     const WideVec3Lanes old_slide = touched * (old_full - dot(old_full, g.old_normal) * g.old_normal);
     const WideVec3Lanes old_drag = g.old_total - g.kn * old_pressed * g.old_normal + g.kt * g.old_spring;
 
-    const WideVec3Lanes before = g.old_spring + half_dt * old_slide;
     const V twist = half_dt * dot(g.spin_a + g.spin_b, g.normal);
-    WideVec3Lanes s = before + twist * cross(g.normal, before);
-    s = s - dot(g.normal, s) * g.normal;
-    const V length2 = dot(before, before), turned2 = dot(s, s);
-    s = (turned2 > zero ? sqrt(length2 / (turned2 > zero ? turned2 : one)) : zero) * s;
-    s = s + half_dt * slide;
-
-    // A slipping spring keeps the length of the limit, and the dashpot beside it is off; one that does not slip may pull too hard with its dashpot.
-    const V bound = g.friction * r.force, limit = g.give * r.force, stretched2 = dot(s, s);
-    const auto slips = stretched2 > limit * limit;
-    WideVec3Lanes tangential = (-g.kt) * s + (slips ? zero : -g.ct * g.root_mass) * slide;
-    const V size2 = dot(tangential, tangential);
-    const auto over = ~slips & (size2 > bound * bound);
-    if (any(slips | over)) {
-        const V shrink = (slips ? limit : bound) / sqrt(slips ? stretched2 : over ? size2 : one);
-        s = (slips ? shrink : one) * s;
-        tangential = (slips | over ? shrink : one) * tangential;
-    }
+    const Rubbed rubbed = rub(g, g.normal, old_slide, slide, twist, g.root_mass, r.force, dt, g.old_spring);
+    const WideVec3Lanes s = rubbed.spring, tangential = rubbed.total;
     r.spring = s;
     const WideVec3Lanes pull = (-g.kt) * s;
     r.total = r.force * g.normal + tangential;
@@ -78,7 +61,7 @@ struct PointResult {
     r.stored_normal = g.kn * pressed * (g.overlap - half * pressed);
     r.stored_tangential = half * g.kt * kept2;
     const V taken = half * g.kt * (all<V>(dt) * (dot(g.old_spring, old_slide) + dot(s, slide)) - kept2 + held2);
-    r.friction = slips ? taken : (touched > zero ? zero : taken);
+    r.friction = rubbed.slips ? taken : (touched > zero ? zero : taken);
     r.damping = -half_dt * (dot(old_drag, old_full) * touched + dot(drag, full));
     return r;
 }
