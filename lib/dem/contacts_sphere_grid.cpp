@@ -1,11 +1,11 @@
-// Contact of spheres with grids and polyhedra: with the nearest wall (contacts_nearest.cpp), or pressed on every wall of a grid.
+// Contact of spheres with grids and polyhedra: with the nearest wall (contacts_press.cpp), or pressed on every wall of a grid.
 #include <bit>
 #include <cmath>
 #include <numbers>
 
 #include "core/parallel.h"
 #include "dem/detail/impl.h"
-#include "dem/detail/nearest_walls.h"
+#include "dem/detail/presses.h"
 
 namespace coral::dem {
 
@@ -65,6 +65,7 @@ struct Places {
         force[to] += force[from];
         energy[to] += energy[from];
         force[from].setZero();
+        energy[from] = 0.0;
         if (slot[to] < 0) std::swap(slot[to], slot[from]);
     }
     /// Energy of the hardest pressed wall: a flat one that is deep in the sphere presses on several places around it.
@@ -103,6 +104,49 @@ private:
     }
 };
 
+/// Whether a force over the stiffness is more than rounding [m2].
+bool counts(double force, double radius) { return force > 1e-12 * radius * radius; }
+
+/// What the walls press on the sphere of pair k, to be worked with others. \returns whether it touches
+bool hand_over(const Places& places, World::Impl& world, std::size_t k, const Vec3& offset, GeneralForce& out, detail::Presses& presses)
+{
+    SphereGridList& l = world.sphere_grids;
+    const std::size_t i = std::size_t(l.sphere[k]), j = std::size_t(l.grid[k]);
+    const double radius = world.radius[i], scale = world.scale[j], kn = world.law(world.material[i], world.material[j]).kn;
+    const double stiffness = kn * scale * scale / (2.0 * std::numbers::pi * radius), unit = stiffness * scale / kn;
+    double size[Slots::count], stored = 0.0;
+    int count = 0;
+    for (int p = 0; p < places.count; ++p) {
+        size[p] = places.force[p].norm();
+        stored += stiffness * scale * places.energy[p];
+        count += counts(size[p] * scale * scale, radius);
+    }
+    Slots& slots = l.slots[k];
+    if (count == 0) {
+        if (l.touch[k] != 0) presses.open(k);
+        return false;
+    }
+    detail::Press& press = presses.next(count);
+    std::uint8_t used = 0;
+    int to = 0;
+    for (int p = 0; p < places.count; ++p) {
+        if (!counts(size[p] * scale * scale, radius)) continue;
+        const int at = places.slot[p] >= 0 ? places.slot[p] : std::countr_one(unsigned(used | slots.used));
+        if (places.slot[p] < 0) slots.spring[at].setZero();
+        used = std::uint8_t(used | 1 << at);
+        slots.normal[at] = places.force[p] / size[p];
+        press.place[to++] = {slots.normal[at], stiffness * size[p], overlap_with_plane(unit * places.energy[p], radius), slots.spring[at].data()};
+    }
+    slots.used = used;
+    press.entry = k;
+    press.out = &out;
+    press.offset = offset;
+    press.stored = stored;
+    press.overlap = count == 1 ? press.place[0].overlap : overlap_with_plane(unit * places.energy_of_wall(), radius);
+    presses.add(press);
+    return true;
+}
+
 }  // namespace
 
 /// Whether a second wall is about to touch a sphere that its nearest wall touches. Away from one wall the distance grows with the way; it grows
@@ -124,7 +168,7 @@ bool World::Impl::is_cornered(std::size_t i, std::size_t j, detail::CellMemory& 
 }
 
 /// The sphere of pair k pressed on the surface of its grid. \returns whether it touches
-bool World::Impl::press_on_walls(std::size_t k, double dt, GeneralForce& out, LoopSums& s, std::vector<Crossing>& crossing)
+bool World::Impl::press_on_walls(std::size_t k, GeneralForce& out, detail::Presses& presses)
 {
     SphereGridList& l = sphere_grids;
     const std::size_t i = std::size_t(l.sphere[k]), j = std::size_t(l.grid[k]);
@@ -147,12 +191,7 @@ bool World::Impl::press_on_walls(std::size_t k, double dt, GeneralForce& out, Lo
         moved = 0.0;
         if (is_loose()) return false;
     }
-    const PairLaw& pair = law(material[i], material[j]);
-    const double stiffness = pair.kn * scale[j] * scale[j] / (2.0 * std::numbers::pi * radius[i]);
-    Slots& slots = l.slots[k];
-    Places places(slots);
-    PressMemory now;
-    Vec3 push = Vec3::Zero();
+    Places places(l.slots[k]);
     detail::QuadPress press[2];
     const auto in_reach = [&](std::size_t n) { return n < pocket.quads.size() && pocket.quads[n].clearance < r + moved; };
     for (std::size_t n = 0; in_reach(n); n += 2) {
@@ -164,95 +203,31 @@ bool World::Impl::press_on_walls(std::size_t k, double dt, GeneralForce& out, Lo
                 if (detail::any(quad.covered > detail::all(0.0))) places.add(quad);
         }
     }
-    for (int p = 0; p < places.count; ++p) {
-        push += stiffness * places.force[p];
-        now.stored += stiffness * scale[j] * places.energy[p];
-    }
     for (int to = 0; to < places.count; ++to)
         for (int from = to + 1; from < places.count; ++from) places.merge(to, from);
-    now.push.add(q[j] * push, Vec3::Zero(), offset);
-
-    const double root_mass = std::sqrt(1.0 / (inverse_mass[i] + inverse_mass[j]));
-    const double spin_limit = 1e-12 * radius[i] * radius[i];
-    Slots kept;
-    kept.next = slots.next;
-    const double unit = stiffness * scale[j] / pair.kn;
-    bool clamped = false;
-    double total = 0.0;
-    out = {};
-    for (int p = 0; p < places.count; ++p) {
-        const double size = places.force[p].norm();
-        if (size * scale[j] * scale[j] <= spin_limit) continue;
-        const Vec3 local_normal = places.force[p] / size, n = q[j] * local_normal;
-        const double overlap = overlap_with_plane(unit * places.energy[p], radius[i]);
-        const double approach = (v_end[j] + w[j].cross(offset) - v_end[i]).dot(n);
-        const double fn = normal_force(stiffness * size, approach, pair, root_mass);
-        clamped = clamped || fn == 0.0;
-        const double arm_i = radius[i] - 0.5 * overlap;
-        const Vec3 arm_j = offset - arm_i * n;
-        const Vec3 velocity = v[i] - v[j] - arm_i * w[i].cross(n) - w[j].cross(arm_j);
-        const Vec3 slide = velocity - n.dot(velocity) * n;
-        const int at = places.slot[p] >= 0 ? places.slot[p] : std::countr_one(unsigned(kept.used | slots.used));
-        if (places.slot[p] >= 0) kept.spring[at] = slots.spring[at];
-        kept.used = std::uint8_t(kept.used | 1 << at);
-        kept.normal[at] = local_normal;
-        const detail::Friction friction = detail::rub({pair, n, slide, slide, 0.5 * (w[i] + w[j]).dot(n), root_mass}, fn, dt, kept.spring[at]);
-        const Vec3& ft = friction.total;
-        now.pull.add(friction.pull, -arm_i * n, arm_j);
-        now.drag.add((fn - stiffness * size) * n + (ft - friction.pull), -arm_i * n, arm_j);
-        now.stretched += 0.5 * pair.kt * kept.spring[at].squaredNorm();
-        out.normal_force += fn * n;
-        out.tangential_force += ft;
-        out.torque_a -= arm_i * n.cross(ft);
-        out.torque_b -= arm_j.cross(fn * n + ft);
-        out.arm -= (fn * arm_i) * n;
-        total += fn;
-        ++out.points;
-    }
-    slots = kept;
-    out.a = Index(i);
-    out.b = Index(j);
-    close_books(k, now, clamped, dt, out, s, crossing);
-    if (out.points == 0) return false;
-    if (total > 0.0) out.arm /= total;
-    out.overlap = overlap_with_plane(unit * places.energy_of_wall(), radius[i]);
-    s.max_overlap = std::max(s.max_overlap, out.overlap / radius[i]);
-    s.deep += out.overlap > options.overlap_cap * radius[i];
-    return true;
+    return hand_over(places, *this, k, offset, out, presses);
 }
 
-/// The energies of pair k after a step: what dashpots and friction took, and what the forces at both ends of the step did beside the change
-/// of what is stored, which goes back to the motion (see WorkError). Springs of slots that are left or opened count as slip.
-void World::Impl::close_books(std::size_t k, const PressMemory& now, bool clamped, double dt, GeneralForce& out, LoopSums& s,
-                              std::vector<Crossing>& crossing)
+/// Pair k has touched until the last step: what dashpots and friction took from there, and what the forces did beside the change of what was
+/// stored, which goes back to the motion (see WorkError). Springs that are left count as slip.
+void World::Impl::open_press(std::size_t k, double dt, LoopSums& s, std::vector<Crossing>& crossing)
 {
     SphereGridList& l = sphere_grids;
-    const std::size_t i = std::size_t(out.a), j = std::size_t(out.b);
-    const std::uint8_t before = l.touch[k];
-    const PressMemory past = before ? l.press[k] : PressMemory{};
+    const std::size_t i = std::size_t(l.sphere[k]), j = std::size_t(l.grid[k]);
+    const PressMemory past = l.press[k];
+    const bool clamped = l.touch[k] == 2;
     const Vec3 velocity = v[i] - v[j];
-    const auto work = [&](const Wrench& first, const Wrench& second) {
-        return 0.5 * dt * (first.power(velocity, w[i], w_before[j]) + second.power(velocity, w[i], w[j]));
-    };
-    s.elastic_normal += now.stored;
-    s.elastic_tangential += now.stretched;
-    s.damping -= work(past.drag, now.drag);
-    s.friction -= work(past.pull, now.pull) + now.stretched - past.stretched;
-    l.touch[k] = out.points == 0 ? 0 : clamped ? 2 : 1;
-    l.press[k] = now;
+    const auto work = [&](const Wrench& wrench) { return 0.5 * dt * wrench.power(velocity, w[i], w_before[j]); };
+    s.damping -= work(past.drag);
+    s.friction -= work(past.pull) - past.stretched;
+    l.touch[k] = 0;
+    l.slots[k].used = 0;
+    l.press[k] = {};
+    l.press[k].cell = past.cell;
     if (dt <= 0.0) return;
-    const Vec3 sum = now.push.force + past.push.force;
-    const double strength = sum.norm(), error = past.stored - now.stored - work(past.push, now.push) + past.owed;
-    if (before == 2 || clamped || !(strength > 0.0)) {
-        s.damping += error;
-    } else if (std::abs(error) > 1e-6 * (past.stored + now.stored)) {
-        crossing.push_back({out.a, out.b, error, sum / strength, periodic(x[i] - x[j])});
-        if (out.points > 0) crossing.back().press = Index(k);
-    } else if (out.points > 0) {
-        l.press[k].owed = error;
-    } else {
-        s.damping += error;
-    }
+    const double strength = past.push.force.norm(), error = past.stored - work(past.push) + past.owed;
+    if (clamped || !(strength > 0.0) || std::abs(error) <= 1e-6 * past.stored) s.damping += error;
+    else crossing.push_back({l.sphere[k], l.grid[k], error, past.push.force / strength, periodic(x[i] - x[j])});
 }
 
 void World::Impl::sphere_grid_loop(double dt)
@@ -265,7 +240,7 @@ void World::Impl::sphere_grid_loop(double dt)
         const std::size_t block = first / grid_grain;
         LoopSums s;
         std::vector<Crossing>& crossing = crossings[base + block];
-        detail::NearestWalls on_nearest(*this, dt, s, crossing);
+        detail::Presses presses(*this, dt, s, crossing);
         GeneralForce* const begin = l.out.data() + first;
         GeneralForce* out = begin;
         std::size_t count = first;
@@ -299,10 +274,9 @@ void World::Impl::sphere_grid_loop(double dt)
             if (automatic && !(l.within[k] > 0.0) && (dt <= 0.0 || (k + std::size_t(counters.steps)) % looks == 0) &&
                 is_cornered(std::size_t(l.sphere[k]), std::size_t(l.grid[k]), l.press[k].cell, l.beyond[k]))
                 make_pocket_here(k);
-            if (!nearest && l.within[k] > 0.0 ? press_on_walls(k, dt, *out, s, crossing) : on_nearest.find(k, *out)) ++out;
+            if (!nearest && l.within[k] > 0.0 ? press_on_walls(k, *out, presses) : presses.on_nearest(k, *out)) ++out;
         }
-        on_nearest.press();
-        on_nearest.add_sums();
+        presses.finish();
         s.tests = std::int64_t(last - first);
         s.touching = out - begin;
         out_count[2][block] = std::int32_t(out - begin);

@@ -142,12 +142,6 @@ struct Slots {
 /// Force on the sphere of a pair, with its torques about the centres of both (that on the grid is of the counterforce).
 struct Wrench {
     Vec3 force = Vec3::Zero(), torque_a = Vec3::Zero(), torque_b = Vec3::Zero();
-    void add(const Vec3& f, const Vec3& arm_a, const Vec3& arm_b)
-    {
-        force += f;
-        torque_a += arm_a.cross(f);
-        torque_b -= arm_b.cross(f);
-    }
     double power(const Vec3& velocity, const Vec3& spin_a, const Vec3& spin_b) const
     {
         return force.dot(velocity) + torque_a.dot(spin_a) + torque_b.dot(spin_b);
@@ -264,6 +258,10 @@ struct BroadPair {
     Index a, b;
 };
 
+namespace detail {
+class Presses;
+}
+
 struct World::Impl {
     WorldOptions options;
     std::vector<std::shared_ptr<const Shape>> shapes;
@@ -361,12 +359,12 @@ struct World::Impl {
     void sphere_loop(double dt);
     void sphere_wall_loop(double dt);
     void sphere_grid_loop(double dt);
-    bool press_on_walls(std::size_t k, double dt, GeneralForce& out, LoopSums& s, std::vector<Crossing>& crossing);
+    bool press_on_walls(std::size_t k, GeneralForce& out, detail::Presses& presses);
     bool is_cornered(std::size_t sphere, std::size_t grid, detail::CellMemory& here, detail::CellMemory& beyond) const;
     void make_pocket(std::size_t k);
     void gather_pocket(std::size_t k);
     void make_pocket_here(std::size_t k);
-    void close_books(std::size_t k, const PressMemory& now, bool clamped, double dt, GeneralForce& out, LoopSums& s, std::vector<Crossing>& crossing);
+    void open_press(std::size_t k, double dt, LoopSums& s, std::vector<Crossing>& crossing);
     void node_loop(double dt);
     void sum_forces();
     void sum_forces(std::size_t first, std::size_t last);
