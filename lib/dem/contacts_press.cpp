@@ -107,15 +107,14 @@ struct Presses::Forces {
     Memory now{};
 };
 
-bool Presses::on_nearest(std::size_t k, GeneralForce& out)
+bool Presses::on_nearest(std::size_t k, const Vec3& offset, const Vec3& local, GeneralForce& out)
 {
     SphereGridList& l = w_.sphere_grids;
     const std::size_t i = std::size_t(l.sphere[k]), j = std::size_t(l.grid[k]);
     const DistanceField field(*w_.shapes[std::size_t(w_.shape[j])]);
     Press& p = one_.press[one_.count];
-    p.offset = w_.periodic(w_.x[i] - w_.x[j]);
     Vec3 gradient;
-    p.overlap = w_.radius[i] - w_.scale[j] * field.distance_and_gradient(w_.q[j].conjugate() * p.offset / w_.scale[j], gradient, l.press[k].cell);
+    p.overlap = w_.radius[i] - w_.scale[j] * field.distance_and_gradient(local, gradient, l.press[k].cell);
     if (!(p.overlap > 0.0)) {
         if (l.touch[k] != 0) open(k);
         return false;
@@ -131,6 +130,7 @@ bool Presses::on_nearest(std::size_t k, GeneralForce& out)
     if (turned && w_.options.sphere_scheme == SphereScheme::automatic && field.grid) w_.make_pocket_here(k);
     p.entry = k;
     p.out = &out;
+    p.offset = offset;
     p.stored = kn * pressed * (p.overlap - 0.5 * pressed);
     p.count = 1;
     if (++one_.count == full) work(one_);

@@ -104,6 +104,30 @@ private:
     }
 };
 
+/// A sphere as seen from its grid: offset in the world, place in the grid's frame and scale.
+struct Seen {
+    alignas(32) double offset[4], place[4];  ///< three numbers each
+};
+void see(const World::Impl& w, const Index* entry, std::size_t count, Seen* seen)
+{
+    using V = detail::WideLanes;
+    constexpr int full = detail::wide_lane_count;
+    std::size_t i[full], j[full];
+    for (int k = 0; k < full; ++k) {
+        const std::size_t pair = std::size_t(entry[std::size_t(k) < count ? k : 0]);
+        i[k] = std::size_t(w.sphere_grids.sphere[pair]);
+        j[k] = std::size_t(w.sphere_grids.grid[pair]);
+    }
+    const detail::WideVec3Lanes offset = w.periodic(detail::wide_vectors([&](int k) -> const Vec3& { return w.x[i[k]]; }) -
+                                                    detail::wide_vectors([&](int k) -> const Vec3& { return w.x[j[k]]; }));
+    // As the conjugate of a quaternion turns a vector.
+    const detail::WideFours q = detail::wide_fours([&](int k) { return w.q[j[k]].coeffs().data(); });
+    const detail::WideVec3Lanes axis{q.a, q.b, q.c}, across = detail::all<V>(2.0) * cross(offset, axis), turned = offset + q.d * across + cross(across, axis);
+    const V scale = detail::lanes_from<V>([&](int k) { return w.scale[j[k]]; });
+    detail::put_fours({offset.x, offset.y, offset.z, scale}, [&](int k) { return seen[k].offset; });
+    detail::put_fours({turned.x / scale, turned.y / scale, turned.z / scale, scale}, [&](int k) { return seen[k].place; });
+}
+
 /// Whether a force over the stiffness is more than rounding [m2].
 bool counts(double force, double radius) { return force > 1e-12 * radius * radius; }
 
@@ -151,14 +175,13 @@ bool hand_over(const Places& places, World::Impl& world, std::size_t k, const Ve
 
 /// Whether a second wall is about to touch a sphere that its nearest wall touches. Away from one wall the distance grows with the way; it grows
 /// less where another one is at an angle a: found from a gap of s (1 - cos a) on, s the way.
-bool World::Impl::is_cornered(std::size_t i, std::size_t j, detail::CellMemory& here, detail::CellMemory& beyond) const
+bool World::Impl::is_cornered(std::size_t i, std::size_t j, const Vec3& local, detail::CellMemory& here, detail::CellMemory& beyond) const
 {
     constexpr double way = 0.45, least = 0.01, near = 0.02;  // of the radius
     const Shape& master = *shapes[std::size_t(shape[j])];
     if (master.kind() != ShapeKind::grid) return false;
     const detail::DistanceField field(master);
     const double r = radius[i] / scale[j];
-    const Vec3 local = q[j].conjugate() * periodic(x[i] - x[j]) / scale[j];
     Vec3 gradient;
     const double distance = field.distance_and_gradient(local, gradient, here), slope = gradient.norm();
     if (distance > (1.0 + near) * r) return false;
@@ -168,12 +191,10 @@ bool World::Impl::is_cornered(std::size_t i, std::size_t j, detail::CellMemory& 
 }
 
 /// The sphere of pair k pressed on the surface of its grid. \returns whether it touches
-bool World::Impl::press_on_walls(std::size_t k, GeneralForce& out, detail::Presses& presses)
+bool World::Impl::press_on_walls(std::size_t k, const Vec3& offset, const Vec3& local, GeneralForce& out, detail::Presses& presses)
 {
     SphereGridList& l = sphere_grids;
     const std::size_t i = std::size_t(l.sphere[k]), j = std::size_t(l.grid[k]);
-    const Vec3 offset = periodic(x[i] - x[j]);
-    const Vec3 local = q[j].conjugate() * offset / scale[j];
     // Triangles that were farther away when they were gathered than the sphere has come since are not looked at.
     const Pocket& pocket = l.pocket[k];
     const double r = radius[i] / scale[j];
@@ -266,15 +287,19 @@ void World::Impl::sphere_grid_loop(double dt)
         };
         for (std::size_t n = first; n < std::min(first + 2 * ahead, count); ++n) fetch_pocket(n);
         for (std::size_t n = first; n < std::min(first + ahead, count); ++n) fetch(n);
+        Seen seen[detail::wide_lane_count];
         for (std::size_t n = first; n < count; ++n) {
+            const std::size_t at = (n - first) % detail::wide_lane_count;
+            if (at == 0) see(*this, &l.near[n], count - n, seen);
             if (n + 2 * ahead < count) fetch_pocket(n + 2 * ahead);
             if (n + ahead < count) fetch(n + ahead);
             const std::size_t k = std::size_t(l.near[n]);
+            const Vec3 offset = Vec3::Map(seen[at].offset), local = Vec3::Map(seen[at].place);
             ++s.node_queries;
             if (automatic && !(l.within[k] > 0.0) && (dt <= 0.0 || (k + std::size_t(counters.steps)) % looks == 0) &&
-                is_cornered(std::size_t(l.sphere[k]), std::size_t(l.grid[k]), l.press[k].cell, l.beyond[k]))
+                is_cornered(std::size_t(l.sphere[k]), std::size_t(l.grid[k]), local, l.press[k].cell, l.beyond[k]))
                 make_pocket_here(k);
-            if (!nearest && l.within[k] > 0.0 ? press_on_walls(k, *out, presses) : presses.on_nearest(k, *out)) ++out;
+            if (!nearest && l.within[k] > 0.0 ? press_on_walls(k, offset, local, *out, presses) : presses.on_nearest(k, offset, local, *out)) ++out;
         }
         presses.finish();
         s.tests = std::int64_t(last - first);

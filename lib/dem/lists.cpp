@@ -129,7 +129,7 @@ void make_sphere_grid_list(World::Impl& world, const std::vector<BroadPair>& pai
         l.press.push_back(same ? old.press[k] : PressMemory{});
         const bool had = same && !old.within.empty() && old.within[k] > 0.0;
         detail::CellMemory here, beyond;
-        const bool walls = field.grid && (all_walls || (had && (old.touch[k] != 0 || world.is_cornered(i, j, here, beyond))));
+        const bool walls = field.grid && (all_walls || (had && (old.touch[k] != 0 || world.is_cornered(i, j, local / scale, here, beyond))));
         // A meshed surface lies within a spacing of where the distances say.
         const double room = distance - world.radius[i] - (walls ? scale * field.grid->spacing : 0.0);
         l.clearance.push_back(std::nextafter(float(room), -1.0F));

@@ -359,8 +359,9 @@ struct World::Impl {
     void sphere_loop(double dt);
     void sphere_wall_loop(double dt);
     void sphere_grid_loop(double dt);
-    bool press_on_walls(std::size_t k, GeneralForce& out, detail::Presses& presses);
-    bool is_cornered(std::size_t sphere, std::size_t grid, detail::CellMemory& here, detail::CellMemory& beyond) const;
+    bool press_on_walls(std::size_t k, const Vec3& offset, const Vec3& local, GeneralForce& out, detail::Presses& presses);
+    /// \param local  place of the sphere in the frame and scale of the grid
+    bool is_cornered(std::size_t sphere, std::size_t grid, const Vec3& local, detail::CellMemory& here, detail::CellMemory& beyond) const;
     void make_pocket(std::size_t k);
     void gather_pocket(std::size_t k);
     void make_pocket_here(std::size_t k);

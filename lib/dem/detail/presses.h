@@ -29,8 +29,8 @@ class Presses {
 public:
     Presses(World::Impl& world, double dt, LoopSums& sums, std::vector<Crossing>& crossing) : w_(world), dt_(dt), sums_(sums), crossing_(crossing) {}
 
-    /// Presses the sphere of pair k on the nearest wall. \returns whether it touches; `out` is then written by the end of finish()
-    bool on_nearest(std::size_t k, GeneralForce& out);
+    /// Presses the sphere of pair k, seen so far from the grid and there in its frame and scale, on the nearest wall. \returns whether it touches; `out` is then written by the end of finish()
+    bool on_nearest(std::size_t k, const Vec3& offset, const Vec3& local, GeneralForce& out);
     /// Room for a press with so many places; add() what was put there.
     Press& next(int count);
     void add(const Press& press);
