@@ -54,7 +54,7 @@ TEST(MakeSampleCt, says_what_is_wrong_and_leaves_no_file)
     const ProgramResult unit = run_program(small + "-o a.tif --wall 3s", folder.path());
     EXPECT_EQ(unit.exit_code, 2);
     const ProgramResult target = run_program(small + "-o missing/a.tif", folder.path());
-    EXPECT_EQ(target.exit_code, 1);
+    EXPECT_EQ(target.exit_code, 2);
     EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
 }
 
