@@ -260,7 +260,7 @@ std::vector<std::uint8_t> Simulation::save() const
     const fluid::Precision precision = flow_->options().precision;
     out.reserve(2 * out.bytes().size() + 8 * sizeof(double) * state.pressure.size());  // what follows the fields is less than what is before them
     const auto field = [&](const fluid::FlowField& from) {
-        fluid::in_precision(precision, [&]<class Real>(Real) { 
+        fluid::in_precision(precision, [&]<class Real>(Real) {
             out.array<Real>(from.empty() ? std::span<const Real>() : std::span<const Real>(from.data<Real>(), from.size()));
         });
     };

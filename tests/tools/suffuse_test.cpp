@@ -179,6 +179,30 @@ TEST(Suffuse, stopped_and_resumed_run_ends_as_one_never_stopped)
     }
 }
 
+TEST(Suffuse, run_in_single_precision_resumes_as_one_never_stopped_and_may_go_on_in_double)
+{
+    const ScratchFolder folder;
+    const auto scene = [](const char* precision) {
+        std::string text = erosion_scene("10ms");
+        return text.insert(text.find("[fluid]\n") + 8, "precision = \"" + std::string(precision) + "\"\n");
+    };
+    for (const char* name : {"whole", "parts"}) {
+        fs::create_directories(folder.path() / name);
+        write_text(folder.path() / name / "case.toml", scene("single"));
+    }
+    ASSERT_EQ(run_program("suffuse whole --quiet", folder.path()).exit_code, 0);
+    ASSERT_EQ(run_program("suffuse parts --quiet --until 3.1ms", folder.path()).exit_code, 0);
+    fs::copy(folder.path() / "parts", folder.path() / "double");
+    ASSERT_EQ(run_program("suffuse parts --quiet --resume", folder.path()).exit_code, 0);
+    expect_equal_results(folder.path() / "whole/results.h5", folder.path() / "parts/results.h5");
+    write_text(folder.path() / "double" / "case.toml", scene("double"));
+    ASSERT_EQ(run_program("suffuse double --quiet --resume", folder.path()).exit_code, 0);
+    const auto error = [&](const char* name) { return H5File::open(folder.path() / name / "results.h5").read_doubles("/series/mass_balance_error").back(); };
+    EXPECT_LT(error("double"), 1e-12);
+    EXPECT_GT(error("parts"), 1e-12);
+    EXPECT_LT(error("parts"), 1e-4);
+}
+
 TEST(Suffuse, resumed_run_goes_on_with_the_contact_step_of_the_changed_case)
 {
     const ScratchFolder folder;
