@@ -215,7 +215,7 @@ def flow(options):
 
 def compare_spheres(options, scene):
     header, rows = read_scene(scene)
-    skins = [0.5e-4, 1e-4, 2e-4, 4e-4]
+    skins = [0.2e-4, 0.5e-4, 1e-4, 2e-4, 4e-4]
     entries = [Ours(options, scene, "peer_bed", 1, skins), Ours(options, scene, "peer_bed", 2, skins)]
     if installed("lmp"):
         entries += [Lammps(options, scene, "lmp", "LAMMPS gran/hooke/history", "bed.lammps", skins, model="hooke", newton="off"),
